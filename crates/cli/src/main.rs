@@ -1,0 +1,2 @@
+//! lookmatch
+fn main() {}

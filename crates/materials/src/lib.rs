@@ -1,0 +1,34 @@
+//! Material models: what each one is called, what its parameters mean, and how it reflects light.
+//!
+//! A [`Model`] is a description ([`Parameter`]s as data) and a way to build a [`Bsdf`] from values.
+//! A [`Material`] is a model with a value for each parameter; it is written
+//! `ward:diffuse=0.3,specular=0.1,roughness=0.2` or as JSON.
+//!
+//! Frame and directions follow the field's habit: `z` is the macroscopic normal, `x` the tangent, `y` the
+//! bitangent; `wi` points towards the light and `wo` towards the viewer, both away from the surface.
+//! A BSDF value is in 1/sr, without the cosine.
+//!
+//! This crate does no input or output.
+
+pub mod bsdf;
+pub mod conformance;
+pub mod distribution;
+mod error;
+pub mod fresnel;
+pub mod geometry;
+pub mod masking;
+mod material;
+pub mod microfacet;
+mod model;
+pub mod models;
+mod parameter;
+mod real;
+
+pub use bsdf::{Bsdf, Lobe, Sampling};
+pub use error::MaterialError;
+pub use geometry::Geometry;
+pub use material::{Material, Value};
+pub use model::{Alias, Model, Values};
+pub use models::{by_name, registry};
+pub use parameter::{Interval, Kind, Levels, Parameter, Role};
+pub use real::Real;

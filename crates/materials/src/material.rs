@@ -1,0 +1,314 @@
+//! A model with a value for each parameter, as text, as JSON, and as a BSDF.
+
+use serde_json::{Map, Value as Json};
+
+use crate::{Bsdf, Kind, MaterialError, Model, Role, Values, by_name};
+
+/// The value of one parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// One number.
+    Number(f64),
+    /// Linear RGB.
+    Colour([f64; 3]),
+    /// The name of a formula.
+    Choice(&'static str),
+}
+
+/// A material: a model and the values of all its parameters, each within its range.
+#[derive(Clone, Debug)]
+pub struct Material {
+    model: &'static Model,
+    values: Vec<Value>,
+}
+
+impl PartialEq for Material {
+    fn eq(&self, other: &Self) -> bool {
+        self.model.name == other.model.name && self.values == other.values
+    }
+}
+
+impl Material {
+    /// The model with every parameter at its default.
+    pub fn new(model: &'static Model) -> Self {
+        let default = |kind: &Kind| match kind {
+            Kind::Number { default, .. } => Value::Number(*default),
+            Kind::Colour { default, .. } => Value::Colour(*default),
+            Kind::Choice { options } => Value::Choice(options[0]),
+        };
+        Self { model, values: model.parameters.iter().map(|p| default(&p.kind)).collect() }
+    }
+
+    /// Reads `MODEL:NAME=VALUE,…` or a JSON object with a `model` field. Parameters that are not named keep their
+    /// defaults; a colour is `0.1/0.3/0.1` (JSON: an array) or one number for grey.
+    pub fn parse(text: &str) -> Result<Self, MaterialError> {
+        let text = text.trim();
+        if text.starts_with('{') {
+            let json = serde_json::from_str(text).map_err(|e| syntax(text, e.to_string()))?;
+            return Self::from_json(&json);
+        }
+        let (name, list) = text.split_once(':').unwrap_or((text, ""));
+        let mut assignment = Assignment::new(Self::new(by_name(name.trim())?));
+        for item in list.split(',').map(str::trim).filter(|item| !item.is_empty()) {
+            let (name, value) =
+                item.split_once('=').ok_or_else(|| syntax(text, format!("'{item}' is not NAME=VALUE")))?;
+            assignment.set(name.trim(), value.trim())?;
+        }
+        Ok(assignment.material)
+    }
+
+    /// Reads `{"model": "ward", "diffuse": [0.1, 0.3, 0.1], "roughness": 0.2}`.
+    pub fn from_json(json: &Json) -> Result<Self, MaterialError> {
+        let text = || json.to_string();
+        let object = json.as_object().ok_or_else(|| syntax(&text(), "not a JSON object".into()))?;
+        let name = object
+            .get("model")
+            .and_then(Json::as_str)
+            .ok_or_else(|| syntax(&text(), "the field 'model' is missing".into()))?;
+        let mut assignment = Assignment::new(Self::new(by_name(name)?));
+        for (name, value) in object.iter().filter(|(name, _)| *name != "model") {
+            let value = match value {
+                Json::String(s) => s.clone(),
+                Json::Array(a) => a.iter().map(Json::to_string).collect::<Vec<_>>().join("/"),
+                other => other.to_string(),
+            };
+            assignment.set(name, &value)?;
+        }
+        Ok(assignment.material)
+    }
+
+    /// The JSON form, every parameter named.
+    pub fn to_json(&self) -> Json {
+        let mut object = Map::new();
+        object.insert("model".into(), self.model.name.into());
+        for (parameter, value) in self.model.parameters.iter().zip(&self.values) {
+            let json = match value {
+                Value::Number(v) => Json::from(*v),
+                Value::Colour(c) => Json::from(c.to_vec()),
+                Value::Choice(name) => Json::from(*name),
+            };
+            object.insert(parameter.name.into(), json);
+        }
+        Json::Object(object)
+    }
+
+    /// Its model.
+    pub fn model(&self) -> &'static Model {
+        self.model
+    }
+
+    /// Its values, in the order of the model's parameters.
+    pub fn values(&self) -> &[Value] {
+        &self.values
+    }
+
+    /// Sets a parameter (or all behind an alias) to a value written as text.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), MaterialError> {
+        for index in self.model.resolve(name)? {
+            self.values[index] = self.check(index, parse_value(self.model, index, text)?)?;
+        }
+        Ok(())
+    }
+
+    /// Sets a parameter (or all behind an alias) to a number; a colour becomes grey.
+    pub fn set_number(&mut self, name: &str, value: f64) -> Result<(), MaterialError> {
+        for index in self.model.resolve(name)? {
+            let parsed = match self.model.parameters[index].kind {
+                Kind::Number { .. } => Value::Number(value),
+                Kind::Colour { .. } => Value::Colour([value; 3]),
+                Kind::Choice { .. } => {
+                    return Err(bad_value(self.model, index, &value.to_string()));
+                }
+            };
+            self.values[index] = self.check(index, parsed)?;
+        }
+        Ok(())
+    }
+
+    /// Sets the parameter at `index` in the model's list to a value of its kind.
+    pub fn set_value(&mut self, index: usize, value: Value) -> Result<(), MaterialError> {
+        self.values[index] = self.check(index, value)?;
+        Ok(())
+    }
+
+    /// The number behind a name: the first channel of a colour, the first parameter of an alias.
+    pub fn number(&self, name: &str) -> Result<f64, MaterialError> {
+        let index = self.model.resolve(name)?[0];
+        match self.values[index] {
+            Value::Number(v) => Ok(v),
+            Value::Colour(c) => Ok(c[0]),
+            Value::Choice(name) => Err(bad_value(self.model, index, name)),
+        }
+    }
+
+    /// The value of the first parameter with a role.
+    pub fn by_role(&self, role: Role) -> Option<Value> {
+        self.model.parameters.iter().position(|p| p.role == role).map(|i| self.values[i])
+    }
+
+    /// The material without its specular lobe: every specular reflectance set to 0 (Guarnera *et al.* 2018, 3.1).
+    pub fn diffuse_only(&self) -> Self {
+        let mut copy = self.clone();
+        for (parameter, value) in self.model.parameters.iter().zip(&mut copy.values) {
+            if parameter.role == Role::SpecularReflectance {
+                *value = match value {
+                    Value::Number(_) => Value::Number(0.0),
+                    _ => Value::Colour([0.0; 3]),
+                };
+            }
+        }
+        copy
+    }
+
+    /// Builds its BSDF.
+    pub fn bsdf(&self) -> Box<dyn Bsdf> {
+        (self.model.build)(&Values { model: self.model, values: &self.values })
+    }
+
+    fn check(&self, index: usize, value: Value) -> Result<Value, MaterialError> {
+        let parameter = &self.model.parameters[index];
+        let numbers: &[f64] = match &value {
+            Value::Number(v) => std::slice::from_ref(v),
+            Value::Colour(c) => c,
+            Value::Choice(_) => &[],
+        };
+        match parameter.range() {
+            Some(range) if !numbers.iter().all(|v| range.valid.contains(*v)) => {
+                Err(MaterialError::OutOfRange {
+                    model: self.model.name.into(),
+                    name: parameter.name.into(),
+                    value: show(&value),
+                    range: range.valid.to_string(),
+                })
+            }
+            _ => Ok(value),
+        }
+    }
+}
+
+impl std::fmt::Display for Material {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.model.name)?;
+        for (k, (parameter, value)) in self.model.parameters.iter().zip(&self.values).enumerate() {
+            write!(f, "{}{}={}", if k == 0 { ':' } else { ',' }, parameter.name, show(value))?;
+        }
+        Ok(())
+    }
+}
+
+impl serde::Serialize for Material {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_json().serialize(serializer)
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for Material {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let json = Json::deserialize(deserializer)?;
+        Self::from_json(&json).map_err(serde::de::Error::custom)
+    }
+}
+
+/// A material being written down, with the parameters that were named so far.
+struct Assignment {
+    material: Material,
+    named: Vec<usize>,
+}
+
+impl Assignment {
+    fn new(material: Material) -> Self {
+        Self { material, named: Vec::new() }
+    }
+
+    fn set(&mut self, name: &str, text: &str) -> Result<(), MaterialError> {
+        let model = self.material.model;
+        let indices = model.resolve(name)?;
+        if indices.iter().any(|i| self.named.contains(i)) {
+            return Err(MaterialError::Repeated { model: model.name.into(), name: name.into() });
+        }
+        self.named.extend(indices);
+        self.material.set(name, text)
+    }
+}
+
+fn parse_value(model: &'static Model, index: usize, text: &str) -> Result<Value, MaterialError> {
+    let numbers = || text.split('/').map(|part| part.trim().parse::<f64>().ok()).collect::<Option<Vec<_>>>();
+    let parsed = match &model.parameters[index].kind {
+        Kind::Number { .. } => match numbers().as_deref() {
+            Some([v]) => Some(Value::Number(*v)),
+            _ => None,
+        },
+        Kind::Colour { .. } => match numbers().as_deref() {
+            Some([v]) => Some(Value::Colour([*v; 3])),
+            Some([r, g, b]) => Some(Value::Colour([*r, *g, *b])),
+            _ => None,
+        },
+        Kind::Choice { options } => options.iter().find(|o| **o == text).map(|o| Value::Choice(o)),
+    };
+    parsed.ok_or_else(|| bad_value(model, index, text))
+}
+
+fn bad_value(model: &'static Model, index: usize, value: &str) -> MaterialError {
+    let parameter = &model.parameters[index];
+    let expected = match &parameter.kind {
+        Kind::Number { range, .. } => format!("a number in {}", range.valid),
+        Kind::Colour { range, .. } => format!("a number or R/G/B, each in {}", range.valid),
+        Kind::Choice { options } => format!("one of {}", options.join(", ")),
+    };
+    let (model, name) = (model.name.to_owned(), parameter.name.to_owned());
+    MaterialError::BadValue { model, name, value: value.to_owned(), expected }
+}
+
+fn syntax(text: &str, reason: String) -> MaterialError {
+    MaterialError::Syntax { text: text.to_owned(), reason }
+}
+
+fn show(value: &Value) -> String {
+    match value {
+        Value::Number(v) => v.to_string(),
+        Value::Colour([r, g, b]) if r == g && g == b => r.to_string(),
+        Value::Colour([r, g, b]) => format!("{r}/{g}/{b}"),
+        Value::Choice(name) => (*name).to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registry;
+
+    #[test]
+    fn text_and_json_are_the_same_material() {
+        let text = Material::parse("ward:diffuse=0.1/0.3/0.1,specular=0.1,roughness=0.2").unwrap();
+        let json =
+            Material::parse(r#"{"model":"ward","diffuse":[0.1,0.3,0.1],"specular":0.1,"roughness":0.2}"#)
+                .unwrap();
+        assert_eq!(text, json);
+        assert_eq!(text.number("roughness_v").unwrap(), 0.2);
+    }
+
+    #[test]
+    fn every_model_survives_a_round_trip() {
+        for model in registry() {
+            let material = Material::new(model);
+            assert_eq!(Material::parse(&material.to_string()).unwrap(), material);
+            assert_eq!(Material::from_json(&material.to_json()).unwrap(), material);
+            assert!(material.values().iter().enumerate().all(|(i, v)| material.check(i, *v).is_ok()));
+        }
+    }
+
+    #[test]
+    fn errors_name_what_would_be_accepted() {
+        let message = |text: &str| Material::parse(text).unwrap_err().to_string();
+        assert!(message("wrad:specular=0.1").contains("did you mean 'ward'?"));
+        assert!(message("ward:roughnes=0.1").contains("did you mean 'roughness'?"));
+        assert!(message("ward:specular=2").contains("outside its range [0, 1]"));
+        assert!(message("ward:specular=NaN").contains("outside its range"));
+        assert!(message("ward:specular=much").contains("a number or R/G/B"));
+        assert!(message("ward:variant=gmb").contains("one of gmd, duer, ward"));
+        assert!(message("ward:roughness=0.1,roughness_u=0.2").contains("given twice"));
+        assert!(message("ward:roughness").contains("not NAME=VALUE"));
+        assert!(message("").contains("unknown material model ''"));
+        assert!(message("{\"model\":").contains("cannot read material"));
+    }
+}
