@@ -1,1 +1,25 @@
-//! imaging
+//! HDR images, their files, their colours and the numbers that say how far apart two of them look.
+//!
+//! Everything works on linear RGB with Rec. 709 / sRGB primaries and a D65 white ([`Image`]). Two paths lead to
+//! a difference: the exact one in `f64` ([`Fitness`], [`nrmsd()`]) gives the numbers that are reported, and the
+//! fast one in `f32` ([`lab_planes`], [`squared_distance`]) serves a search that compares thousands of images.
+
+mod atomic;
+mod colour;
+mod error;
+mod false_colour;
+mod file;
+mod image;
+mod lab;
+mod metrics;
+
+pub use atomic::write_atomically;
+pub use colour::{delta_e76, lab_from_linear_srgb, luminance, srgb_decode, srgb_encode};
+pub use error::ImageError;
+pub use false_colour::{delta_e_map, error_map};
+pub use file::{MAX_PIXELS, decode, read, write};
+pub use image::Image;
+pub use lab::{lab_planes, squared_distance, weighted_squared_distance};
+pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
+pub use metrics::mask::{Mask, disc_weight};
+pub use metrics::nrmsd::{nrmsd, nrmsd_pixels};

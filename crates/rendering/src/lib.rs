@@ -1,1 +1,44 @@
-//! rendering
+//! Scenes of spheres on a checkerboard, and the built-in, noise-free renderer of them.
+//!
+//! Nothing in such a scene changes from picture to picture but the material of the spheres. So the light that reaches
+//! each visible point is prepared once ([`Renderer::prepare`]) and each further picture is a short weighted sum per pixel.
+//! All sampling decisions belong to the scene: two pictures differ only by their material, the same material gives
+//! the same bits, on any number of threads.
+//!
+//! What is transported: all direct light, hard shadows of point lights, the checkerboard and (where they have a diffuse
+//! colour of their own) the other spheres as seen in each sphere, with one diffuse bounce between them. What is left
+//! out: light that a sphere throws back onto the checkerboard when its colour is the material's, and the highlights of
+//! one sphere seen in another. `docs/engine.md` has the measured size of both.
+
+mod angles;
+mod bodies;
+mod designed_map;
+mod environment;
+mod error;
+mod field;
+mod film;
+mod gather;
+mod highlights;
+mod irradiance;
+mod lobe_table;
+mod plane;
+mod pyramid;
+mod renderer;
+mod rings;
+mod sampling;
+mod scene;
+mod transport;
+
+pub use designed_map::designed_map;
+pub use environment::EnvironmentMap;
+pub use error::SceneError;
+pub use renderer::{Part, Renderer};
+pub use scene::{Camera, EnvironmentLight, Illumination, Plane, PointLight, Scene, Sphere};
+
+/// A linear RGB value in the first three lanes.
+pub(crate) type Rgb = glam::Vec4;
+
+/// Linear RGB from three numbers.
+pub(crate) fn rgb(c: [f64; 3]) -> Rgb {
+    Rgb::new(c[0] as f32, c[1] as f32, c[2] as f32, 0.0)
+}

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::LatticeError;
 
-/// Guard of the level count: `(0.7 - 0.1) / 0.1` is 5.999… in binary floating point, and must still count as 6 steps.
+/// Guard of the level count: `(0.7 - 0.1) / 0.1` is 5.999… in binary floating point, and must still count as
+/// 6 steps.
 const COUNT_SLACK: f64 = 1e-9;
 
 /// More levels than this on one axis are taken for a mistyped step.
@@ -12,8 +13,8 @@ const MAX_LEVELS: f64 = 1e7;
 
 /// One searched dimension: the regular (or listed) levels of a parameter, in the parameter's own unit.
 ///
-/// Axes made by [`Axis::regular`], [`Axis::listed`] or deserialisation have at least one level, all finite and strictly increasing; a search
-/// checks this again before it starts, because the fields are public.
+/// Axes made by [`Axis::regular`], [`Axis::listed`] or deserialisation have at least one level, all finite
+/// and strictly increasing; a search checks this again before it starts, because the fields are public.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Axis {
@@ -41,43 +42,30 @@ impl TryFrom<Unchecked> for Axis {
 impl Axis {
     /// Levels `min, min + step, …` up to and including `max` where a whole number of steps reaches it.
     ///
-    /// The count is `floor((max - min) / step + 1e-9) + 1`. Each level is the product `min + k * step`, not an accumulated sum, rounded to
-    /// 12 significant digits so that 0.07 prints as 0.07.
+    /// The count is `floor((max - min) / step + 1e-9) + 1`. Each level is the product `min + k * step`, not
+    /// an accumulated sum, rounded to 12 significant digits so that 0.07 prints as 0.07.
     ///
     /// # Errors
-    /// [`LatticeError::Range`] unless `min <= max`, `step > 0`, all are finite and the count is at most ten million.
-    pub fn regular(
-        name: impl Into<String>,
-        min: f64,
-        max: f64,
-        step: f64,
-    ) -> Result<Axis, LatticeError> {
+    /// [`LatticeError::Range`] unless `min <= max`, `step > 0`, all are finite and the count is at most ten
+    /// million.
+    pub fn regular(name: impl Into<String>, min: f64, max: f64, step: f64) -> Result<Axis, LatticeError> {
         let name = name.into();
         let steps = ((max - min) / step + COUNT_SLACK).floor();
         let sound = min.is_finite() && max.is_finite() && step.is_finite() && step > 0.0;
         if !sound || !(0.0..MAX_LEVELS).contains(&steps) {
-            return Err(LatticeError::Range {
-                name,
-                min,
-                max,
-                step,
-            });
+            return Err(LatticeError::Range { name, min, max, step });
         }
-        let levels = (0..=steps as u32)
-            .map(|k| round_12(min + f64::from(k) * step))
-            .collect();
+        let levels = (0..=steps as u32).map(|k| round_12(min + f64::from(k) * step)).collect();
         Axis::listed(name, levels)
     }
 
     /// An axis of the given levels, for a parameter that is switched or sampled unevenly.
     ///
     /// # Errors
-    /// [`LatticeError::Levels`] unless there is at least one level and all are finite and strictly increasing.
+    /// [`LatticeError::Levels`] unless there is at least one level and all are finite and strictly
+    /// increasing.
     pub fn listed(name: impl Into<String>, levels: Vec<f64>) -> Result<Axis, LatticeError> {
-        let axis = Axis {
-            name: name.into(),
-            levels,
-        };
+        let axis = Axis { name: name.into(), levels };
         axis.check()?;
         Ok(axis)
     }
@@ -93,9 +81,7 @@ impl Axis {
         if increasing && finite && countable {
             Ok(())
         } else {
-            Err(LatticeError::Levels {
-                name: self.name.clone(),
-            })
+            Err(LatticeError::Levels { name: self.name.clone() })
         }
     }
 
@@ -109,13 +95,14 @@ impl Axis {
         self.levels.is_empty()
     }
 
-    /// The level at index `i`, counted from 0; NaN past the end, which a renderer or a fitness will refuse, rather than a level nobody asked for.
+    /// The level at index `i`, counted from 0; NaN past the end, which a renderer or a fitness will refuse,
+    /// rather than a level nobody asked for.
     pub fn value(&self, i: usize) -> f64 {
         self.levels.get(i).copied().unwrap_or(f64::NAN)
     }
 
-    /// Index of the level nearest to `value`; the lower of two equally near ones; values outside the range give the first or last level, NaN the
-    /// first.
+    /// Index of the level nearest to `value`; the lower of two equally near ones; values outside the range
+    /// give the first or last level, NaN the first.
     pub fn nearest(&self, value: f64) -> usize {
         let above = self.levels.partition_point(|&level| level < value);
         if above == 0 {
@@ -127,7 +114,8 @@ impl Axis {
         }
     }
 
-    /// Index of the level that equals `value` to within 1e-9 of the distance to the next level (of the level itself where there is but one).
+    /// Index of the level that equals `value` to within 1e-9 of the distance to the next level (of the level
+    /// itself where there is but one).
     pub fn index_of(&self, value: f64) -> Option<usize> {
         let i = self.nearest(value);
         let level = *self.levels.get(i)?;
@@ -136,16 +124,14 @@ impl Axis {
         ((level - value).abs() <= 1e-9 * step).then_some(i)
     }
 
-    /// The number of levels as Guarnera et al. 2018, section 3.3, print it: `floor((max - min) / step)`, which drops the last level.
+    /// The number of levels as Guarnera et al. 2018, section 3.3, print it: `floor((max - min) / step)`,
+    /// which drops the last level.
     ///
-    /// [`Axis::regular`] has one level more. Kept for comparisons with the article; 0 for ranges that `regular` would refuse.
+    /// [`Axis::regular`] has one level more. Kept for comparisons with the article; 0 for ranges that
+    /// `regular` would refuse.
     pub fn paper_count(min: f64, max: f64, step: f64) -> usize {
         let steps = ((max - min) / step + COUNT_SLACK).floor();
-        if steps.is_finite() && steps > 0.0 {
-            steps as usize
-        } else {
-            0
-        }
+        if steps.is_finite() && steps > 0.0 { steps as usize } else { 0 }
     }
 }
 
@@ -194,9 +180,7 @@ mod tests {
     #[test]
     fn nearest_and_exact_levels() {
         let axis = Axis::listed("x", vec![0.0, 1.0, 10.0]).expect("sound levels");
-        let found: Vec<usize> = [-5.0, 0.5, 0.51, 5.5, 5.6, 99.0, f64::NAN]
-            .map(|v| axis.nearest(v))
-            .to_vec();
+        let found: Vec<usize> = [-5.0, 0.5, 0.51, 5.5, 5.6, 99.0, f64::NAN].map(|v| axis.nearest(v)).to_vec();
         assert_eq!(found, [0, 0, 1, 1, 2, 2, 0]);
         assert_eq!(axis.index_of(1.0 + 1e-10), Some(1));
         assert_eq!(axis.index_of(1.1), None);

@@ -32,19 +32,15 @@ impl Search for Exhaustive {
         let mut points = problem.bounds.points().peekable();
         while points.peek().is_some() {
             let batch: Vec<Point> = points.by_ref().take(self.batch.max(1)).collect();
-            // A memo per batch checks the values; one for all would hold the whole lattice in memory for nothing.
+            // A memo per batch checks the values; one for all would hold the whole lattice in memory for
+            // nothing.
             let mut memo = Memo::new(problem.lattice, objective);
             memo.evaluate(&batch)?;
             evaluations += memo.evaluations();
             best = lower(best, memo.best());
         }
         let (fitness, best) = best.ok_or(SearchError::NothingEvaluated)?;
-        Ok(Outcome {
-            best,
-            fitness,
-            evaluations,
-            generations: 0,
-        })
+        Ok(Outcome { best, fitness, evaluations, generations: 0 })
     }
 }
 

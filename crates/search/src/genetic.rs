@@ -1,21 +1,25 @@
-//! Integer genetic algorithm MI-LXPM: Laplace crossover, power mutation, truncation, tournaments by feasibility.
+//! Integer genetic algorithm MI-LXPM: Laplace crossover, power mutation, truncation, tournaments by
+//! feasibility.
 //!
-//! Requirements: none on the fitness; best where it is smooth and has few basins. Whole generations are evaluated at once.
-//! Parameters: [`GeneticSettings`], each field with its range; presets `lookmatch` (default), `guarnera2018`, `deep2009`.
-//! References: K. Deep, K. P. Singh, M. L. Kansal and C. Mohan, Appl. Math. Comput. 212 (2009); D. Guarnera, G. C. Guarnera, M. Toscani,
-//! M. Glencross, B. Li, J. Y. Hardeberg and K. R. Gegenfurtner, "Perceptually validated cross-renderer analytical BRDF parameter remapping",
-//! IEEE TVCG (2018), section 3.3; K. Deb, Comput. Methods Appl. Mech. Eng. 186 (2000).
-//! Known defects: no guarantee to find the optimum. The two published presets copy the articles' text, not their code, which is not available: see
-//! the settings for each point on which the literature disagrees.
-
-use std::cmp::Ordering;
+//! Requirements: none on the fitness; best where it is smooth and has few basins. Whole generations are
+//! evaluated at once.
+//! Parameters: [`GeneticSettings`], each field with its range; presets `lookmatch` (default), `guarnera2018`,
+//! `deep2009`.
+//! References: K. Deep, K. P. Singh, M. L. Kansal and C. Mohan, Appl. Math. Comput. 212 (2009); D. Guarnera,
+//! G. C. Guarnera, M. Toscani, M. Glencross, B. Li, J. Y. Hardeberg and K. R. Gegenfurtner, "Perceptually
+//! validated cross-renderer analytical BRDF parameter remapping", IEEE TVCG (2018), section 3.3; K. Deb,
+//! Comput. Methods Appl. Mech. Eng. 186 (2000).
+//! Known defects: no guarantee to find the optimum. The two published presets copy the articles' text, not
+//! their code, which is not available: see the settings for each point on which the literature disagrees.
 
 use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_pcg::Pcg64;
 
 use crate::{
-    Bounds, Duplicates, Exhaustive, GeneticSettings, Memo, Objective, OutOfBounds, Outcome, Point, Problem, Search, SearchError,
-    StallDivisor, Start, Tournament, operators, polish, sampling,
+    Bounds, Breeding, Duplicates, Exhaustive, GeneticSettings, Memo, Objective, OutOfBounds, Outcome, Point,
+    Problem, Search, SearchError, StallDivisor, Start, Tournament,
+    individual::{Individual, feasible_point, genes, violation},
+    operators, polish, sampling,
 };
 
 /// The integer genetic algorithm with its settings.
@@ -29,26 +33,17 @@ pub struct Genetic {
 impl Genetic {
     /// The algorithm with settings of one's own, under the name "genetic".
     pub fn new(settings: GeneticSettings) -> Genetic {
-        Genetic {
-            name: "genetic",
-            settings,
-        }
+        Genetic { name: "genetic", settings }
     }
 
     /// The preset [`GeneticSettings::guarnera2018`].
     pub fn guarnera2018() -> Genetic {
-        Genetic {
-            name: "genetic-guarnera2018",
-            settings: GeneticSettings::guarnera2018(),
-        }
+        Genetic { name: "genetic-guarnera2018", settings: GeneticSettings::guarnera2018() }
     }
 
     /// The preset [`GeneticSettings::deep2009`].
     pub fn deep2009() -> Genetic {
-        Genetic {
-            name: "genetic-deep2009",
-            settings: GeneticSettings::deep2009(),
-        }
+        Genetic { name: "genetic-deep2009", settings: GeneticSettings::deep2009() }
     }
 }
 
@@ -84,34 +79,6 @@ impl Search for Genetic {
     }
 }
 
-/// One candidate: whole-numbered genes, perhaps outside the bounds.
-#[derive(Clone, Debug)]
-struct Individual {
-    genes: Vec<f64>,
-    /// Not read where `violation` is above 0.
-    fitness: f64,
-    /// Sum of the bound violations in lattice steps; 0 for feasible individuals.
-    violation: f64,
-}
-
-impl Individual {
-    fn score(&self) -> (f64, f64) {
-        (self.fitness, self.violation)
-    }
-
-    /// Best first, by Deb's rules, then by genes.
-    fn order(&self, other: &Individual) -> Ordering {
-        let genes = || self.genes.partial_cmp(&other.genes).unwrap_or(Ordering::Equal);
-        if operators::beats(self.score(), other.score()) {
-            Ordering::Less
-        } else if operators::beats(other.score(), self.score()) {
-            Ordering::Greater
-        } else {
-            genes()
-        }
-    }
-}
-
 /// The state of one run.
 struct Run<'a> {
     settings: &'a GeneticSettings,
@@ -125,15 +92,11 @@ impl Run<'_> {
     fn finish(mut self, guesses: &[Point], axes: usize) -> Result<Outcome, SearchError> {
         let generations = self.evolve(guesses, axes)?;
         for start in self.basins() {
-            polish::descend(&mut self.memo, self.bounds, &start, self.settings.polish_radius)?;
+            let radius = self.settings.polish_radius;
+            polish::descend(&mut self.memo, self.bounds, &start, radius)?;
         }
         let (fitness, best) = self.memo.best().ok_or(SearchError::NothingEvaluated)?;
-        Ok(Outcome {
-            best: best.clone(),
-            fitness,
-            evaluations: self.memo.evaluations(),
-            generations,
-        })
+        Ok(Outcome { best: best.clone(), fitness, evaluations: self.memo.evaluations(), generations })
     }
 
     /// Breeds generations until the best fitness stalls; returns their number.
@@ -142,7 +105,8 @@ impl Run<'_> {
         let mut population = self.evaluated(first)?;
         let mut history = vec![self.best_fitness()];
         let limit = self.settings.max_generations_per_axis.saturating_mul(axes);
-        while history.len() <= limit && !self.stalled(&history) && self.memo.evaluations() < self.bounds.len() {
+        while history.len() <= limit && !self.stalled(&history) && self.memo.evaluations() < self.bounds.len()
+        {
             population = self.next_generation(population)?;
             history.push(self.best_fitness());
         }
@@ -217,17 +181,24 @@ impl Run<'_> {
         winners
     }
 
-    /// One child per parent: crossed in pairs, mutated, truncated, brought within bounds and made new, as the settings say.
+    /// One child per parent: crossed in pairs, mutated, truncated, brought within bounds and made new, as the
+    /// settings say.
     fn children(&mut self, population: &[Individual], parents: &[usize]) -> Vec<Vec<f64>> {
         let mut children = Vec::with_capacity(parents.len() + 1);
         for pair in parents.chunks(2) {
             let (a, b) = (&population[pair[0]].genes, &population[pair[pair.len() - 1]].genes);
-            let (first, second) = self.crossed(a, b);
+            let cross = self.rng.random::<f64>() < self.settings.crossover_probability;
+            let (mut first, mut second) = if cross { self.crossed(a, b) } else { (a.clone(), b.clone()) };
+            let probability = match self.settings.breeding {
+                Breeding::CrossThenMutate => self.settings.mutation_probability,
+                Breeding::CrossOrMutate => f64::from(u8::from(!cross)),
+            };
+            self.mutate(&mut first, probability);
+            self.mutate(&mut second, probability);
             children.extend([first, second]);
         }
         children.truncate(parents.len());
         for child in &mut children {
-            self.mutate(child);
             self.truncate(child);
             self.confine(child);
         }
@@ -236,9 +207,6 @@ impl Run<'_> {
     }
 
     fn crossed(&mut self, a: &[f64], b: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        if self.rng.random::<f64>() >= self.settings.crossover_probability {
-            return (a.to_vec(), b.to_vec());
-        }
         let mut gene = |(&x1, &x2): (&f64, &f64)| {
             // 1 - U lies in (0, 1]: its logarithm is finite.
             let u = 1.0 - self.rng.random::<f64>();
@@ -249,9 +217,9 @@ impl Run<'_> {
         a.iter().zip(b).map(&mut gene).unzip()
     }
 
-    fn mutate(&mut self, child: &mut [f64]) {
+    fn mutate(&mut self, child: &mut [f64], probability: f64) {
         for (k, gene) in child.iter_mut().enumerate() {
-            if self.rng.random::<f64>() < self.settings.mutation_probability {
+            if self.rng.random::<f64>() < probability {
                 let (low, high) = (f64::from(self.bounds.low[k]), f64::from(self.bounds.high[k]));
                 let (s, r) = (self.rng.random(), self.rng.random());
                 let (p, spread) = (self.settings.mutation_power, self.settings.mutation_spread);
@@ -320,7 +288,8 @@ impl Run<'_> {
         Ok(individuals.collect())
     }
 
-    /// Where descents start: the best point, then the next best ones that are not its neighbours or each other's.
+    /// Where descents start: the best point, then the next best ones that are not its neighbours or each
+    /// other's.
     fn basins(&self) -> Vec<Point> {
         let mut starts: Vec<Point> = Vec::new();
         for (_, point) in self.memo.ranking() {
@@ -341,22 +310,4 @@ impl Run<'_> {
             a[k].abs_diff(b[k]) > (levels / 10).max(2)
         })
     }
-}
-
-fn genes(point: &Point) -> Vec<f64> {
-    point.iter().map(|&i| f64::from(i)).collect()
-}
-
-/// The point of whole-numbered genes, unless some lie outside the bounds.
-fn feasible_point(genes: &[f64], bounds: &Bounds) -> Option<Point> {
-    (violation(genes, bounds) <= 0.0).then(|| genes.iter().map(|&gene| gene as u32).collect())
-}
-
-/// Sum over the genes of the distance to the nearest bound, 0 within.
-fn violation(genes: &[f64], bounds: &Bounds) -> f64 {
-    let sides = bounds.low.iter().zip(&bounds.high);
-    let outside = genes.iter().zip(sides).map(|(&gene, (&low, &high))| {
-        (f64::from(low) - gene).max(gene - f64::from(high)).max(0.0)
-    });
-    outside.sum()
 }

@@ -42,9 +42,7 @@ pub struct Lattice {
 impl Lattice {
     /// Number of points, `usize::MAX` where there are more than that; 1 for no axes.
     pub fn len(&self) -> usize {
-        self.axes
-            .iter()
-            .fold(1, |product, axis| product.saturating_mul(axis.len()))
+        self.axes.iter().fold(1, |product, axis| product.saturating_mul(axis.len()))
     }
 
     /// Whether there is no point, because some axis has no level.
@@ -59,7 +57,8 @@ impl Lattice {
         axes.map(|(k, axis)| axis.value(index(k))).collect()
     }
 
-    /// The point whose levels are nearest to `values`, axis by axis; the first level where a value is missing.
+    /// The point whose levels are nearest to `values`, axis by axis; the first level where a value is
+    /// missing.
     pub fn nearest(&self, values: &[f64]) -> Point {
         let value = |k: usize| values.get(k).copied().unwrap_or(f64::NAN);
         let axes = self.axes.iter().enumerate();
@@ -93,19 +92,14 @@ impl Bounds {
     /// The whole of `lattice`.
     pub fn full(lattice: &Lattice) -> Bounds {
         let last = |axis: &Axis| axis.len().saturating_sub(1) as u32;
-        Bounds {
-            low: vec![0; lattice.axes.len()],
-            high: lattice.axes.iter().map(last).collect(),
-        }
+        Bounds { low: vec![0; lattice.axes.len()], high: lattice.axes.iter().map(last).collect() }
     }
 
     /// Whether `point` has one index per axis and all lie within.
     pub fn contains(&self, point: &Point) -> bool {
         let box_sides = self.low.iter().zip(&self.high);
         point.len() == self.low.len()
-            && box_sides
-                .zip(point)
-                .all(|((low, high), i)| (low..=high).contains(&i))
+            && box_sides.zip(point).all(|((low, high), i)| (low..=high).contains(&i))
     }
 
     /// `point` moved to the nearest point within, axis by axis.
@@ -117,12 +111,9 @@ impl Bounds {
 
     /// Number of points, `usize::MAX` where there are more; 0 if a low bound exceeds its high bound.
     pub fn len(&self) -> usize {
-        self.low
-            .iter()
-            .zip(&self.high)
-            .fold(1usize, |product, (&low, &high)| {
-                product.saturating_mul((u64::from(high) + 1).saturating_sub(u64::from(low)) as usize)
-            })
+        self.low.iter().zip(&self.high).fold(1usize, |product, (&low, &high)| {
+            product.saturating_mul((u64::from(high) + 1).saturating_sub(u64::from(low)) as usize)
+        })
     }
 
     /// Whether no point lies within.
@@ -132,10 +123,7 @@ impl Bounds {
 
     /// All points within, in lexicographic order (the last axis runs fastest).
     pub fn points(&self) -> Points {
-        Points {
-            next: (!self.is_empty()).then(|| self.low.clone()),
-            bounds: self.clone(),
-        }
+        Points { next: (!self.is_empty()).then(|| self.low.clone()), bounds: self.clone() }
     }
 }
 
@@ -176,9 +164,7 @@ mod tests {
     fn lattice() -> Lattice {
         let switch = Axis::listed("specular", vec![0.0, 1.0]).expect("sound levels");
         let alpha = Axis::regular("alpha", 0.1, 0.4, 0.1).expect("a sound range");
-        Lattice {
-            axes: vec![switch, alpha],
-        }
+        Lattice { axes: vec![switch, alpha] }
     }
 
     #[test]
@@ -194,28 +180,19 @@ mod tests {
 
     #[test]
     fn narrowed_bounds() {
-        let bounds = Bounds {
-            low: vec![1, 2],
-            high: vec![1, 3],
-        };
+        let bounds = Bounds { low: vec![1, 2], high: vec![1, 3] };
         let points: Vec<Point> = bounds.points().collect();
         assert_eq!(points, [[1, 2], [1, 3]]);
         assert_eq!(bounds.len(), 2);
         assert!(!bounds.contains(&vec![1, 1]) && !bounds.contains(&vec![1]));
         assert_eq!(bounds.clamp(&vec![0, 9]), [1, 3]);
-        let empty = Bounds {
-            low: vec![1],
-            high: vec![0],
-        };
+        let empty = Bounds { low: vec![1], high: vec![0] };
         assert_eq!((empty.len(), empty.points().count()), (0, 0));
     }
 
     #[test]
     fn counts_saturate() {
-        let bounds = Bounds {
-            low: vec![0; 9],
-            high: vec![u32::MAX; 9],
-        };
+        let bounds = Bounds { low: vec![0; 9], high: vec![u32::MAX; 9] };
         assert_eq!(bounds.len(), usize::MAX);
     }
 }

@@ -1,8 +1,9 @@
 //! Discrete search over a lattice of target parameters.
 //!
-//! A [`Problem`] is a [`Lattice`], the [`Bounds`] within it and perhaps starting points; an [`Objective`] gives the fitness of whole populations, so
-//! that renders can be batched; a [`Search`] finds the point of lowest fitness. Ties go to the lexicographically smallest point, so that searches
-//! agree. The outcome depends on problem, objective and seed only, never on threads or time.
+//! A [`Problem`] is a [`Lattice`], the [`Bounds`] within it and perhaps starting points; an [`Objective`]
+//! gives the fitness of whole populations, so that renders can be batched; a [`Search`] finds the point of
+//! lowest fitness. Ties go to the lexicographically smallest point, so that searches agree. The outcome
+//! depends on problem, objective and seed only, never on threads or time.
 //!
 //! ```
 //! use lookmatch_search::{Axis, Bounds, Lattice, ObjectiveFn, Point, Problem, by_name};
@@ -23,6 +24,7 @@ mod axis;
 mod error;
 mod exhaustive;
 mod genetic;
+mod individual;
 mod lattice;
 mod memo;
 pub mod operators;
@@ -40,4 +42,4 @@ pub use lattice::{Bounds, Lattice, LatticeError, Point, Points};
 pub use memo::Memo;
 pub use problem::{Objective, ObjectiveFn, Outcome, Problem, Search};
 pub use registry::{Entry, by_name, registry};
-pub use settings::{Duplicates, GeneticSettings, OutOfBounds, StallDivisor, Start, Tournament};
+pub use settings::{Breeding, Duplicates, GeneticSettings, OutOfBounds, StallDivisor, Start, Tournament};

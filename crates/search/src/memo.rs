@@ -15,19 +15,16 @@ pub struct Memo<'a> {
 impl<'a> Memo<'a> {
     /// An empty memo before `objective`; `lattice` only serves messages.
     pub fn new(lattice: &'a Lattice, objective: &'a mut dyn Objective) -> Memo<'a> {
-        Memo {
-            lattice,
-            objective,
-            known: HashMap::new(),
-            best: None,
-        }
+        Memo { lattice, objective, known: HashMap::new(), best: None }
     }
 
-    /// Fitness of each point in the order given. Points not seen before go to the objective in one batch, in order of first appearance.
+    /// Fitness of each point in the order given. Points not seen before go to the objective in one batch, in
+    /// order of first appearance.
     ///
     /// # Errors
-    /// [`SearchError::Objective`] if the objective fails, [`SearchError::ResultCount`] if it returns too few or too many values,
-    /// [`SearchError::NotFinite`] naming the first point whose fitness is NaN or infinite.
+    /// [`SearchError::Objective`] if the objective fails, [`SearchError::ResultCount`] if it returns too few
+    /// or too many values, [`SearchError::NotFinite`] naming the first point whose fitness is NaN or
+    /// infinite.
     pub fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, SearchError> {
         let fresh = self.unseen(points);
         if !fresh.is_empty() {
@@ -61,18 +58,13 @@ impl<'a> Memo<'a> {
 
     fn unseen(&self, points: &[Point]) -> Vec<Point> {
         let mut fresh = HashSet::new();
-        let new = points
-            .iter()
-            .filter(|p| !self.known.contains_key(*p) && fresh.insert(*p));
+        let new = points.iter().filter(|p| !self.known.contains_key(*p) && fresh.insert(*p));
         new.cloned().collect()
     }
 
     fn remember(&mut self, points: Vec<Point>, values: Vec<f64>) -> Result<(), SearchError> {
         if values.len() != points.len() {
-            return Err(SearchError::ResultCount {
-                expected: points.len(),
-                found: values.len(),
-            });
+            return Err(SearchError::ResultCount { expected: points.len(), found: values.len() });
         }
         for (point, value) in points.into_iter().zip(values) {
             if !value.is_finite() {

@@ -1,12 +1,15 @@
 //! Lattice descent: from a starting point to the best point of its basin.
 //!
-//! Looks at the next levels along each axis, then at the diagonals; moves to the best better point, on in the same direction with steps that double
-//! while they pay; ends when no point within the radius is better. A pattern search after R. Hooke and T. A. Jeeves, "Direct search solution of
-//! numerical and statistical problems", J. ACM 8 (1961).
+//! Looks at the next levels along each axis, then at the diagonals; moves to the best better point, on in the
+//! same direction with steps that double while they pay; ends when no point within the radius is better. A
+//! pattern search after R. Hooke and T. A. Jeeves, "Direct search solution of numerical and statistical
+//! problems", J. ACM 8 (1961).
 //!
-//! Requirements: a fitness with some slope; flat parts are crossed only towards lower indices, by the tie rule.
+//! Requirements: a fitness with some slope; flat parts are crossed only towards lower indices, by the tie
+//! rule.
 //! Parameters: `radius` of the last look-around in lattice steps.
-//! Known defects: stops in a local minimum that is wider than the radius. Axes of two levels are switched alone, never in a diagonal.
+//! Known defects: stops in a local minimum that is wider than the radius. Axes of two levels are switched
+//! alone, never in a diagonal.
 
 use crate::{Bounds, Memo, Point, SearchError};
 
@@ -27,7 +30,12 @@ pub fn descend(memo: &mut Memo, bounds: &Bounds, start: &Point, radius: u32) -> 
 }
 
 /// The best better point around `here`, cheapest neighbourhoods first.
-fn improve(memo: &mut Memo, bounds: &Bounds, here: &Point, radius: u32) -> Result<Option<Point>, SearchError> {
+fn improve(
+    memo: &mut Memo,
+    bounds: &Bounds,
+    here: &Point,
+    radius: u32,
+) -> Result<Option<Point>, SearchError> {
     let axial = axial(here, bounds);
     if let Some(point) = best_of(memo, &axial, here)? {
         return Ok(Some(point));
@@ -46,11 +54,7 @@ fn improve(memo: &mut Memo, bounds: &Bounds, here: &Point, radius: u32) -> Resul
 
 /// Goes on from `next` in the direction that led there from `here`, with doubling steps, while that pays.
 fn advance(memo: &mut Memo, bounds: &Bounds, here: &Point, next: Point) -> Result<Point, SearchError> {
-    let direction: Vec<i64> = next
-        .iter()
-        .zip(here)
-        .map(|(&b, &a)| i64::from(b) - i64::from(a))
-        .collect();
+    let direction: Vec<i64> = next.iter().zip(here).map(|(&b, &a)| i64::from(b) - i64::from(a)).collect();
     let mut best = next;
     let mut step = 1;
     loop {
@@ -91,8 +95,9 @@ fn axial(here: &Point, bounds: &Bounds) -> Vec<Point> {
     points
 }
 
-/// On a plateau, where some of `tied` have the fitness of `here`: the points with one axis at its lowest level, so that the first point of a plateau
-/// is found in a jump per axis. Plateaus are common: with a specular switch off, nothing else of the lobe matters.
+/// On a plateau, where some of `tied` have the fitness of `here`: the points with one axis at its lowest
+/// level, so that the first point of a plateau is found in a jump per axis. Plateaus are common: with a
+/// specular switch off, nothing else of the lobe matters.
 fn floors(memo: &Memo, tied: &[Point], here: &Point, bounds: &Bounds) -> Vec<Point> {
     let level = memo.get(here);
     if !tied.iter().any(|point| memo.get(point) == level) {
@@ -103,9 +108,7 @@ fn floors(memo: &Memo, tied: &[Point], here: &Point, bounds: &Bounds) -> Vec<Poi
 
 /// All points at a Chebyshev distance of exactly `reach`, over the axes with more than two levels.
 fn ring(here: &Point, bounds: &Bounds, reach: u32) -> Vec<Point> {
-    let wide: Vec<usize> = (0..here.len())
-        .filter(|&k| bounds.high[k] - bounds.low[k] > 1)
-        .collect();
+    let wide: Vec<usize> = (0..here.len()).filter(|&k| bounds.high[k] - bounds.low[k] > 1).collect();
     if wide.len() <= FULL_DIAGONALS {
         return shell(here, bounds, &wide, reach);
     }
@@ -120,10 +123,7 @@ fn ring(here: &Point, bounds: &Bounds, reach: u32) -> Vec<Point> {
 
 /// All points at a Chebyshev distance of exactly `reach` from `here` that differ only along `axes`.
 fn shell(here: &Point, bounds: &Bounds, axes: &[usize], reach: u32) -> Vec<Point> {
-    let mut cube = Bounds {
-        low: here.clone(),
-        high: here.clone(),
-    };
+    let mut cube = Bounds { low: here.clone(), high: here.clone() };
     for &k in axes {
         cube.low[k] = here[k].saturating_sub(reach).max(bounds.low[k]);
         cube.high[k] = here[k].saturating_add(reach).min(bounds.high[k]);
@@ -142,7 +142,9 @@ fn shifted(point: &Point, direction: &[i64], step: i64, bounds: &Bounds) -> Poin
     let moved: Point = point
         .iter()
         .zip(direction)
-        .map(|(&i, &d)| i64::from(i).saturating_add(d.saturating_mul(step)).clamp(0, i64::from(u32::MAX)) as u32)
+        .map(|(&i, &d)| {
+            i64::from(i).saturating_add(d.saturating_mul(step)).clamp(0, i64::from(u32::MAX)) as u32
+        })
         .collect();
     bounds.clamp(&moved)
 }

@@ -4,8 +4,9 @@ use crate::{Axis, Bounds, Lattice, ObjectiveError, Point, SearchError};
 
 /// What is minimised.
 pub trait Objective {
-    /// Fitness of each point, lower is better, finite, in the order of `points`. Whole populations come at once, so that renders can be batched and
-    /// run in parallel; within one run no point comes twice. The same point must always have the same fitness.
+    /// Fitness of each point, lower is better, finite, in the order of `points`. Whole populations come at
+    /// once, so that renders can be batched and run in parallel; within one run no point comes twice. The
+    /// same point must always have the same fitness.
     ///
     /// # Errors
     /// Whatever keeps a point from being evaluated; the search stops and hands it on.
@@ -31,7 +32,8 @@ pub struct Problem<'a> {
     pub lattice: &'a Lattice,
     /// The part of it that may be used.
     pub bounds: Bounds,
-    /// Starting points, for example the results of neighbouring source parameters; those outside the bounds are moved to the nearest point within.
+    /// Starting points, for example the results of neighbouring source parameters; those outside the bounds
+    /// are moved to the nearest point within.
     pub guesses: Vec<Point>,
     /// Seed of all random draws: equal seeds give equal outcomes.
     pub seed: u64,
@@ -53,12 +55,7 @@ impl Problem<'_> {
             axis.check()?;
             let (low, high) = (self.bounds.low[k], self.bounds.high[k]);
             if low > high || high as usize >= axis.len() {
-                return Err(SearchError::Bounds {
-                    axis: axis.name.clone(),
-                    low,
-                    high,
-                    levels: axis.len(),
-                });
+                return Err(SearchError::Bounds { axis: axis.name.clone(), low, high, levels: axis.len() });
             }
         }
         Ok(())
@@ -69,11 +66,7 @@ fn same_axes(what: &'static str, axes: &[Axis], indices: &[u32]) -> Result<(), S
     if axes.len() == indices.len() {
         return Ok(());
     }
-    Err(SearchError::Dimension {
-        what,
-        expected: axes.len(),
-        found: indices.len(),
-    })
+    Err(SearchError::Dimension { what, expected: axes.len(), found: indices.len() })
 }
 
 /// What a search found.
@@ -97,6 +90,7 @@ pub trait Search: Send + Sync {
     /// Searches for the point of lowest fitness within the problem's bounds.
     ///
     /// # Errors
-    /// [`SearchError`] if the problem or the settings are unsound, or the objective fails or returns a value that is not finite.
+    /// [`SearchError`] if the problem or the settings are unsound, or the objective fails or returns a value
+    /// that is not finite.
     fn run(&self, problem: &Problem, objective: &mut dyn Objective) -> Result<Outcome, SearchError>;
 }

@@ -35,13 +35,8 @@ pub fn by_name(name: &str) -> Result<Box<dyn Search>, SearchError> {
         return Ok((entry.make)());
     }
     let likeness = |entry: &&Entry| strsim::jaro_winkler(entry.name, name);
-    let nearest = REGISTRY
-        .iter()
-        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-    Err(SearchError::Unknown {
-        name: name.to_owned(),
-        nearest: nearest.map_or("", |entry| entry.name),
-    })
+    let nearest = REGISTRY.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+    Err(SearchError::Unknown { name: name.to_owned(), nearest: nearest.map_or("", |entry| entry.name) })
 }
 
 #[cfg(test)]

@@ -19,8 +19,8 @@ pub fn uniform_points(count: usize, bounds: &Bounds, rng: &mut Pcg64) -> Vec<Poi
     (0..count).map(|_| uniform(bounds, rng)).collect()
 }
 
-/// Latin hypercube of `count` points within `bounds`: each axis is cut into `count` equal parts, each of which holds one point. Axes of fewer levels
-/// get every level equally often, to within one.
+/// Latin hypercube of `count` points within `bounds`: each axis is cut into `count` equal parts, each of
+/// which holds one point. Axes of fewer levels get every level equally often, to within one.
 pub fn stratified_points(count: usize, bounds: &Bounds, rng: &mut Pcg64) -> Vec<Point> {
     let mut points = vec![Point::with_capacity(bounds.low.len()); count];
     for (&low, &high) in bounds.low.iter().zip(&bounds.high) {
@@ -36,13 +36,15 @@ pub fn stratified_points(count: usize, bounds: &Bounds, rng: &mut Pcg64) -> Vec<
     points
 }
 
-/// A random point within `bounds` that is neither in `memo` nor in `taken`; `None` if a few attempts find none.
+/// A random point within `bounds` that is neither in `memo` nor in `taken`; `None` if a few attempts find
+/// none.
 pub fn unseen(memo: &Memo, taken: &[Point], bounds: &Bounds, rng: &mut Pcg64) -> Option<Point> {
     let mut draw = || uniform(bounds, rng);
     (0..ATTEMPTS).map(|_| draw()).find(|point| is_new(point, memo, taken))
 }
 
-/// A point near `centre` that is neither in `memo` nor in `taken`: every gene moves by up to a number of steps that grows from 1 with the attempts.
+/// A point near `centre` that is neither in `memo` nor in `taken`: every gene moves by up to a number of
+/// steps that grows from 1 with the attempts.
 pub fn unseen_near(
     centre: &Point,
     memo: &Memo,
@@ -74,10 +76,7 @@ mod tests {
 
     #[test]
     fn a_latin_hypercube_holds_every_part_once() {
-        let bounds = Bounds {
-            low: vec![0, 5, 3],
-            high: vec![1, 24, 3],
-        };
+        let bounds = Bounds { low: vec![0, 5, 3], high: vec![1, 24, 3] };
         let points = stratified_points(20, &bounds, &mut Pcg64::seed_from_u64(3));
         assert_eq!(points.iter().filter(|p| p[0] == 0).count(), 10);
         let mut second: Vec<u32> = points.iter().map(|p| p[1]).collect();

@@ -4,15 +4,28 @@ use serde::{Deserialize, Serialize};
 
 use crate::{SearchError, operators::Spread};
 
-/// How the parents of a generation are drawn; in each tournament the best individual wins by Deb's feasibility rules.
+/// How the parents of a generation are drawn; in each tournament the best individual wins by Deb's
+/// feasibility rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tournament {
     /// Every tournament draws its members at random (Guarnera et al. 2018, section 3.3).
     Random,
-    /// The population is shuffled and split into tournaments, as often as a tournament has members, so that each individual enters that many
-    /// tournaments (Deep et al. 2009).
+    /// The population is shuffled and split into tournaments, as often as a tournament has members, so that
+    /// each individual enters that many tournaments (Deep et al. 2009).
     Rounds,
+}
+
+/// How children come from their parents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Breeding {
+    /// Every child may be crossed, and then each of its genes may mutate (Deep et al. 2009).
+    CrossThenMutate,
+    /// A child either is crossed or, being the copy of a single parent, has every gene mutated ("either by
+    /// crossing over … or by applying small mutations to the DNA of a single parent", Guarnera et al. 2018,
+    /// section 3.3; MATLAB's `ga`). The mutation probability is not used.
+    CrossOrMutate,
 }
 
 /// What happens to a child with a gene outside the bounds.
@@ -35,7 +48,8 @@ pub enum Duplicates {
     Keep,
     /// It makes room for a random point never evaluated.
     Random,
-    /// It makes room for a point never evaluated near by: each gene moves by a random number of steps, the farther the more attempts fail.
+    /// It makes room for a point never evaluated near by: each gene moves by a random number of steps, the
+    /// farther the more attempts fail.
     Near,
 }
 
@@ -45,7 +59,8 @@ pub enum Duplicates {
 pub enum Start {
     /// Uniformly at random.
     Uniform,
-    /// Latin hypercube: along every axis one individual in each of as many equal parts as there are individuals.
+    /// Latin hypercube: along every axis one individual in each of as many equal parts as there are
+    /// individuals.
     Stratified,
 }
 
@@ -53,7 +68,8 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StallDivisor {
-    /// `max(1, |best|)`, as MATLAB's `ga`: absolute for fitness below 1, so the fitness must be scaled to suit.
+    /// `max(1, |best|)`, as MATLAB's `ga`: absolute for fitness below 1, so the fitness must be scaled to
+    /// suit.
     AtLeastOne,
     /// `|best|`: the same stop whatever the fitness is multiplied by.
     Magnitude,
@@ -71,6 +87,8 @@ pub struct GeneticSettings {
     pub population_max: usize,
     /// Part of the population that survives unchanged, 0..=1, rounded up.
     pub elite_fraction: f64,
+    /// How children come from their parents.
+    pub breeding: Breeding,
     /// Probability p_c that two parents are crossed rather than copied, 0..=1.
     pub crossover_probability: f64,
     /// Probability p_m that a gene mutates, 0..=1.
@@ -93,7 +111,8 @@ pub struct GeneticSettings {
     pub duplicates: Duplicates,
     /// How the initial population is drawn.
     pub start: Start,
-    /// The search stops when the best fitness has changed by no more than `stall_tolerance` over this many generations, 1 or more.
+    /// The search stops when the best fitness has changed by no more than `stall_tolerance` over this many
+    /// generations, 1 or more.
     pub stall_generations: usize,
     /// Largest relative change that counts as none.
     pub stall_tolerance: f64,
@@ -101,7 +120,8 @@ pub struct GeneticSettings {
     pub stall_divisor: StallDivisor,
     /// Upper limit of generations per searched axis.
     pub max_generations_per_axis: usize,
-    /// From how many of the best distinct basins a lattice descent starts after the last generation; 0 for none.
+    /// From how many of the best distinct basins a lattice descent starts after the last generation; 0 for
+    /// none.
     pub polish_starts: usize,
     /// Distance in lattice steps within which the descent looks for a better point before it ends, 1 or more.
     pub polish_radius: u32,
@@ -114,15 +134,17 @@ impl Default for GeneticSettings {
 }
 
 impl GeneticSettings {
-    /// Guarnera et al. 2018, section 3.3, where the article is silent MATLAB's `ga` with integer constraints, which its text follows: population
-    /// min(max(10 n, 40), 100), elite 5 %, binary tournaments, children outside the bounds penalised, stop after 50 generations that change the best
-    /// fitness by no more than 1e-6.
+    /// Guarnera et al. 2018, section 3.3, where the article is silent MATLAB's `ga` with integer constraints,
+    /// which its text follows: population min(max(10 n, 40), 100), elite 5 %, binary tournaments, children
+    /// outside the bounds penalised, stop after 50 generations that change the best fitness by no more than
+    /// 1e-6.
     pub fn guarnera2018() -> GeneticSettings {
         GeneticSettings {
             population_per_axis: 10,
             population_min: 40,
             population_max: 100,
             elite_fraction: 0.05,
+            breeding: Breeding::CrossOrMutate,
             crossover_probability: 0.8,
             mutation_probability: 0.005,
             laplace_a: 0.0,
@@ -143,29 +165,45 @@ impl GeneticSettings {
         }
     }
 
-    /// MI-LXPM as Deep et al. 2009 describe it: 10 n individuals, three-way tournaments in rounds, complete replacement without elite. The stopping
-    /// rule is that of [`GeneticSettings::guarnera2018`], because theirs needs the known optimum.
+    /// MI-LXPM as Deep et al. 2009 describe it: 10 n individuals, three-way tournaments in rounds, complete
+    /// replacement without elite. It runs to the limit of generations, because their stopping rule needs the
+    /// known optimum.
     pub fn deep2009() -> GeneticSettings {
         GeneticSettings {
             population_min: 2,
-            population_max: usize::MAX,
+            // No limit in practice; files cannot hold usize::MAX.
+            population_max: 1_000_000,
+            stall_generations: 1_000_000,
             elite_fraction: 0.0,
+            breeding: Breeding::CrossThenMutate,
             tournament_size: 3,
             tournament: Tournament::Rounds,
             ..GeneticSettings::guarnera2018()
         }
     }
 
-    /// The preset for matching appearance.
+    /// The default, tuned for few distinct points where the fitness compares pictures: smooth, curved narrow
+    /// valleys, plateaus behind a switch.
+    ///
+    /// Against [`GeneticSettings::guarnera2018`]: a Latin hypercube to start from; three-way tournaments,
+    /// wider crossover (b = 0.5) and mutation after it (p_m = 0.1); children outside the bounds move to them;
+    /// children seen before make room for new points near by; an early stop, relative to the fitness itself;
+    /// then descents from the three best basins. On synthetic matches it was not tuned on (`tests/measure.rs`
+    /// with other sources) it found the optimum in 99.4 to 100 % of runs, the published settings in 97 to
+    /// 99.4 %, for 9 % more evaluations on 3,010 points, 10 % fewer on 11,900 and 16 % fewer on 48,160.
     pub fn lookmatch() -> GeneticSettings {
         GeneticSettings {
+            breeding: Breeding::CrossThenMutate,
+            mutation_probability: 0.1,
+            laplace_b: 0.5,
+            tournament_size: 3,
             duplicates: Duplicates::Near,
             out_of_bounds: OutOfBounds::Clamp,
             start: Start::Stratified,
-            stall_generations: 5,
+            stall_generations: 4,
             stall_divisor: StallDivisor::Magnitude,
-            polish_starts: 2,
-            polish_radius: 2,
+            polish_starts: 3,
+            polish_radius: 3,
             ..GeneticSettings::guarnera2018()
         }
     }

@@ -1,8 +1,9 @@
 //! Fitness functions of the shape met in BRDF matching, small enough to be enumerated.
 //!
-//! The renders are rows of "pixels": a Gaussian or Trowbridge-Reitz lobe of some roughness over half-vector angles and three angles of incidence,
-//! scaled by the Fresnel reflectance of some index of refraction, on a diffuse base, in CIE lightness. Their root-mean-square difference has the
-//! curved valley of index against roughness, and the plateau where the specular switch is off. A hash of the point roughens it a little.
+//! The renders are rows of "pixels": a Gaussian or Trowbridge-Reitz lobe of some roughness over half-vector
+//! angles and three angles of incidence, scaled by the Fresnel reflectance of some index of refraction, on a
+//! diffuse base, in CIE lightness. Their root-mean-square difference has the curved valley of index against
+//! roughness, and the plateau where the specular switch is off. A hash of the point roughens it a little.
 #![allow(dead_code)]
 
 use lookmatch_search::{Axis, Bounds, Lattice, Objective, ObjectiveError, Point, Problem};
@@ -98,12 +99,7 @@ impl Scene {
     }
 
     pub fn problem(&self, seed: u64) -> Problem<'_> {
-        Problem {
-            lattice: &self.lattice,
-            bounds: Bounds::full(&self.lattice),
-            guesses: vec![],
-            seed,
-        }
+        Problem { lattice: &self.lattice, bounds: Bounds::full(&self.lattice), guesses: vec![], seed }
     }
 
     fn row_of(&self, point: &Point) -> &Row {
@@ -134,9 +130,7 @@ impl Match<'_> {
         let lattice = &self.scene.lattice;
         let all = lattice.points(&Bounds::full(lattice));
         let scored = all.map(|p| (self.fitness(&p), p));
-        scored
-            .min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)))
-            .expect("a lattice has points")
+        scored.min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1))).expect("a lattice has points")
     }
 }
 
@@ -164,13 +158,7 @@ pub fn sources(scene: &Scene, count: u64, rough: f64) -> Vec<Match<'_>> {
                 9 => row(shape, if k % 20 == 9 { 0.0 } else { at(0.1, 0.6) }, index, alpha),
                 _ => row(shape, 1.0, index, alpha),
             };
-            Match {
-                scene,
-                source,
-                rough,
-                salt: k,
-                calls: 0,
-            }
+            Match { scene, source, rough, salt: k, calls: 0 }
         })
         .collect()
 }
@@ -184,16 +172,24 @@ pub struct Score {
 }
 
 impl Score {
-    pub fn of(search: &dyn lookmatch_search::Search, scene: &Scene, sources: &mut [Match], seeds: u64) -> Score {
+    pub fn of(
+        search: &dyn lookmatch_search::Search,
+        scene: &Scene,
+        sources: &mut [Match],
+        seeds: std::ops::Range<u64>,
+    ) -> Score {
         let mut score = Score { runs: 0, found: 0, evaluations: vec![], misses: vec![] };
         for (k, source) in sources.iter_mut().enumerate() {
             let truth = source.truth();
-            for seed in 0..seeds {
+            for seed in seeds.clone() {
                 let outcome = search.run(&scene.problem(seed), source).expect("a sound problem");
                 score.runs += 1;
                 score.found += usize::from(outcome.best == truth.1);
                 if outcome.best != truth.1 {
-                    score.misses.push(format!("source {k} seed {seed}: {:?} {} not {:?} {}", outcome.best, outcome.fitness, truth.1, truth.0));
+                    score.misses.push(format!(
+                        "source {k} seed {seed}: {:?} {} not {:?} {}",
+                        outcome.best, outcome.fitness, truth.1, truth.0
+                    ));
                 }
                 score.evaluations.push(outcome.evaluations);
             }

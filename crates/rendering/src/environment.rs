@@ -1,0 +1,227 @@
+//! Light from far away: a latitude-longitude map, filtered look-ups, and directions drawn by its brightness.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+use glam::DVec3;
+use lookmatch_imaging::Image;
+
+use crate::angles::{map_direction, map_position};
+use crate::pyramid::Pyramid;
+use crate::sampling::zero_two;
+use crate::scene::EnvironmentLight;
+use crate::{Rgb, SceneError, designed_map};
+
+/// The map that ships with the program (CC0, see `assets/README.md`).
+const INTERIOR: &[u8] = include_bytes!("../assets/interior.exr");
+
+/// Directions drawn for irradiance.
+const LIGHT_SAMPLES: u32 = 2048;
+
+/// A texel brighter than this many times the mean radiance is a lamp.
+const LAMP: f64 = 10.0;
+/// Lamps at most; where more texels are bright, they are gathered in tiles.
+const MOST_LAMPS: usize = 128;
+
+/// A map that is ready to give light.
+#[derive(Clone, Debug)]
+pub struct EnvironmentMap {
+    /// The map as it is.
+    pyramid: Pyramid,
+    /// The map without what its lamps exceed the limit by: free of peaks that fall between samples.
+    dimmed: Pyramid,
+    /// Direction of each lamp and its irradiance on a surface that faces it: what `dimmed` lacks.
+    pub(crate) lamps: Vec<(DVec3, Rgb)>,
+    /// Rotation in turns.
+    rotation: f32,
+    /// Directions with their radiance over density and count: a sum over them integrates over the sphere.
+    pub(crate) lights: Vec<(DVec3, Rgb)>,
+}
+
+impl EnvironmentMap {
+    /// Reads the map that a scene names.
+    ///
+    /// # Errors
+    /// Where the file cannot be read as an image, or is not twice as wide as high.
+    pub fn load(light: &EnvironmentLight) -> Result<Self, SceneError> {
+        let image = match light.map.as_str() {
+            "designed" => designed_map(),
+            "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), INTERIOR)?,
+            path => lookmatch_imaging::read(Path::new(path))?,
+        };
+        if image.width() != 2 * image.height() {
+            let (width, height) = (image.width(), image.height());
+            return Err(SceneError::Aspect { map: light.map.clone(), width, height });
+        }
+        Ok(Self::new(&image, light.scale, light.rotation))
+    }
+
+    /// Prepares a 2:1 image. Negative values, which compression leaves in some published maps, count as 0.
+    pub(crate) fn new(image: &Image, scale: f64, rotation: f64) -> Self {
+        let texel = |p: &[f32; 3]| Rgb::new(p[0], p[1], p[2], 0.0).max(Rgb::ZERO) * scale as f32;
+        let texels: Vec<Rgb> = image.pixels().iter().map(texel).collect();
+        let (width, height) = (image.width(), image.height());
+        let rotation = (rotation / 360.0).rem_euclid(1.0);
+        let grid = Grid { width, height, rotation };
+        let lights = draw_lights(&grid, &texels);
+        let (dimmed, lamps) = take_lamps(&grid, &texels);
+        let pyramid = |texels| Pyramid::new(width, height, texels, true, |v| (PI * v).sin());
+        let (pyramid, dimmed) = (pyramid(texels), pyramid(dimmed));
+        Self { pyramid, dimmed, lamps, rotation: rotation as f32, lights }
+    }
+
+    /// Radiance from a unit direction, averaged over about `angle` radians.
+    pub(crate) fn radiance(&self, direction: DVec3, angle: f64) -> Rgb {
+        self.look_up(&self.pyramid, direction, angle)
+    }
+
+    /// The same without the lamps.
+    pub(crate) fn dimmed_radiance(&self, direction: DVec3, angle: f64) -> Rgb {
+        self.look_up(&self.dimmed, direction, angle)
+    }
+
+    fn look_up(&self, pyramid: &Pyramid, direction: DVec3, angle: f64) -> Rgb {
+        let (mut u, v) = map_position(direction);
+        u -= self.rotation;
+        if u < 0.0 {
+            u += 1.0;
+        }
+        let texels = angle as f32 * pyramid.height() as f32 / PI as f32;
+        pyramid.sample(u, v, texels)
+    }
+}
+
+/// The texels of a latitude-longitude map as directions.
+struct Grid {
+    width: usize,
+    height: usize,
+    /// In turns.
+    rotation: f64,
+}
+
+impl Grid {
+    /// Cosine of the polar angle at the upper edge of a row.
+    fn edge(&self, row: usize) -> f64 {
+        (PI * row as f64 / self.height as f64).cos()
+    }
+
+    /// Solid angle of a texel of a row, in sr.
+    fn solid_angle(&self, row: usize) -> f64 {
+        (self.edge(row) - self.edge(row + 1)) * TAU / self.width as f64
+    }
+
+    /// The direction at a fraction of a texel, such that equal areas have equal solid angles.
+    fn direction(&self, (x, fx): (usize, f64), (y, fy): (usize, f64)) -> DVec3 {
+        let cos = self.edge(y) + fy * (self.edge(y + 1) - self.edge(y));
+        map_direction((x as f64 + fx) / self.width as f64 + self.rotation, cos.acos() / PI)
+    }
+
+    /// Mean luminance over all directions.
+    fn mean(&self, texels: &[Rgb]) -> f64 {
+        let power = |(i, t): (usize, &Rgb)| luminance(*t) * self.solid_angle(i / self.width);
+        texels.iter().enumerate().map(power).sum::<f64>() / (4.0 * PI)
+    }
+}
+
+fn luminance(c: Rgb) -> f64 {
+    f64::from(0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z)
+}
+
+/// Splits a map into one without peaks and the lamps that it lost.
+fn take_lamps(grid: &Grid, texels: &[Rgb]) -> (Vec<Rgb>, Vec<(DVec3, Rgb)>) {
+    let limit = LAMP * grid.mean(texels);
+    let excess = |t: Rgb| t * (1.0 - limit / luminance(t).max(limit)) as f32;
+    let dimmed = texels.iter().map(|t| *t - excess(*t)).collect();
+    let bright: Vec<usize> = (0..texels.len()).filter(|i| excess(texels[*i]) != Rgb::ZERO).collect();
+    let tiled = |side: usize| {
+        let mut tiles: BTreeMap<(usize, usize), (DVec3, Rgb)> = BTreeMap::new();
+        for i in &bright {
+            let (x, y) = (i % grid.width, i / grid.width);
+            let power = excess(texels[*i]) * grid.solid_angle(y) as f32;
+            let tile = tiles.entry((y / side, x / side)).or_default();
+            tile.0 += grid.direction((x, 0.5), (y, 0.5)) * luminance(power);
+            tile.1 += power;
+        }
+        tiles
+    };
+    let sides = (0..).map(|k| 1 << k);
+    let tiles = sides.map(tiled).find(|tiles| tiles.len() <= MOST_LAMPS).unwrap_or_default();
+    (dimmed, tiles.into_values().map(|(direction, power)| (direction.normalize(), power)).collect())
+}
+
+/// Draws directions with a density proportional to luminance times solid angle, stratified.
+fn draw_lights(grid: &Grid, texels: &[Rgb]) -> Vec<(DVec3, Rgb)> {
+    // A floor of a tenth of the mean keeps dark regions from being drawn never.
+    let floor = 0.1 * grid.mean(texels) + 1e-9;
+    let weight = |x: usize, y: usize| (luminance(texels[y * grid.width + x]) + floor) * grid.solid_angle(y);
+    let rows = cumulative((0..grid.height).map(|y| (0..grid.width).map(|x| weight(x, y)).sum()));
+    let total = rows[grid.height];
+    let columns: Vec<Vec<f64>> =
+        (0..grid.height).map(|y| cumulative((0..grid.width).map(|x| weight(x, y)))).collect();
+    (0..LIGHT_SAMPLES)
+        .map(|i| {
+            let [s, t] = zero_two(i);
+            let y = invert(&rows, s);
+            let x = invert(&columns[y.0], t);
+            let density = weight(x.0, y.0) / total / grid.solid_angle(y.0);
+            let power = texels[y.0 * grid.width + x.0] / (density * f64::from(LIGHT_SAMPLES)) as f32;
+            (grid.direction(x, y), power)
+        })
+        .collect()
+}
+
+/// Running sums, from 0.
+fn cumulative(weights: impl Iterator<Item = f64>) -> Vec<f64> {
+    std::iter::once(0.0)
+        .chain(weights.scan(0.0, |sum, w| {
+            *sum += w;
+            Some(*sum)
+        }))
+        .collect()
+}
+
+/// The cell in which the running sum reaches the share `u` of its total, and where inside the cell.
+fn invert(sums: &[f64], u: f64) -> (usize, f64) {
+    let target = u * sums[sums.len() - 1];
+    let cell = sums.partition_point(|s| *s <= target).clamp(1, sums.len() - 1) - 1;
+    let width = sums[cell + 1] - sums[cell];
+    (cell, if width > 0.0 { ((target - sums[cell]) / width).clamp(0.0, 1.0) } else { 0.5 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orientation_is_canonical() {
+        let image = Image::from_fn(64, 32, |x, y| [x as f32, y as f32, 0.0]);
+        let map = EnvironmentMap::new(&image, 1.0, 0.0);
+        let column = |d: DVec3| map.radiance(d, 0.0).x;
+        assert!((column(DVec3::X) - 15.5).abs() < 0.01, "+X is a quarter turn");
+        assert!((column(DVec3::Z) - 31.5).abs() < 0.01, "+Z is half a turn");
+        assert!(map.radiance(DVec3::Y, 0.0).y < 0.01, "+Y is the first row");
+        let turned = EnvironmentMap::new(&image, 2.0, 90.0);
+        assert!((turned.radiance(DVec3::Z, 0.0).x - 2.0 * 15.5).abs() < 0.02, "what was at +X is at +Z");
+    }
+
+    #[test]
+    fn lamps_carry_what_the_dimmed_map_lacks() {
+        let lamp = |x: usize, y: usize| if x == 20 && (9..11).contains(&y) { 5000.0 } else { 1.0 };
+        let map = EnvironmentMap::new(&Image::from_fn(64, 32, |x, y| [lamp(x, y); 3]), 1.0, 0.0);
+        assert_eq!(map.lamps.len(), 2);
+        let towards = map.lamps[0].0;
+        assert!(map.radiance(towards, 0.0).x > 4000.0 && map.dimmed_radiance(towards, 0.0).x < 100.0);
+        let designed = EnvironmentMap::new(&designed_map(), 1.0, 0.0);
+        assert!(designed.lamps.is_empty(), "the designed map has no peaks");
+    }
+
+    #[test]
+    fn drawn_lights_integrate_the_map() {
+        let map = EnvironmentMap::new(&designed_map(), 1.0, 30.0);
+        let upper: Rgb = map.lights.iter().filter(|l| l.0.y > 0.0).map(|l| l.1 * l.0.y as f32).sum();
+        // Every channel is bright in 2 of 5 bands of equal size: E = π (2·2.5 + 3·0.03)/5.
+        let exact = std::f32::consts::PI * (2.0 * 2.5 + 3.0 * 0.03) / 5.0;
+        assert!((upper / exact - Rgb::new(1.0, 1.0, 1.0, 0.0)).abs().max_element() < 0.01, "{upper} {exact}");
+    }
+}

@@ -1,0 +1,68 @@
+//! What can be wrong with a scene.
+
+use std::path::PathBuf;
+
+use lookmatch_imaging::ImageError;
+use thiserror::Error;
+
+/// A scene that cannot be rendered; the message names the file or field, the value, and what would be accepted.
+#[derive(Debug, Error)]
+pub enum SceneError {
+    /// The scene file cannot be read.
+    #[error("cannot read scene '{}': {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The scene file is not a scene.
+    #[error("scene '{}': {message}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Line, column and reason.
+        message: String,
+    },
+    /// A field has a value that makes no scene.
+    #[error("scene '{scene}': {field} is {value}; expected {expected}")]
+    Field {
+        /// Name of the scene.
+        scene: String,
+        /// Path of the field.
+        field: String,
+        /// The offending value.
+        value: String,
+        /// What would be accepted.
+        expected: &'static str,
+    },
+    /// The scene has no light of the kind that was asked for.
+    #[error("scene '{scene}' has no {light}")]
+    NoLight {
+        /// Name of the scene.
+        scene: String,
+        /// The missing kind.
+        light: &'static str,
+    },
+    /// The environment map cannot be used.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The environment map does not cover the sphere of directions.
+    #[error(
+        "environment map '{map}' is {width} x {height} pixels; a latitude-longitude map is twice as wide as high"
+    )]
+    Aspect {
+        /// Name or path of the map.
+        map: String,
+        /// Its width in pixels.
+        width: usize,
+        /// Its height in pixels.
+        height: usize,
+    },
+    /// A picture of no pixels, or of more than fit.
+    #[error("a picture of {size} x {size} pixels cannot be rendered; the size is 1 to 8192")]
+    Size {
+        /// The side asked for.
+        size: usize,
+    },
+}

@@ -1,0 +1,129 @@
+//! The radiance that arrives at any point from any direction, with the subjects' own highlights left out.
+
+use std::f32::consts::PI;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::angles::{map_direction, map_position};
+use crate::bodies::{Bodies, Body};
+use crate::environment::EnvironmentMap;
+use crate::irradiance::{Place, from_bodies, from_environment, from_point};
+use crate::plane::Board;
+use crate::pyramid::Pyramid;
+use crate::scene::{Illumination, Scene};
+use crate::{Rgb, SceneError, rgb};
+
+/// Rows of the texture of a sphere's diffuse radiance.
+const SPHERE_ROWS: usize = 48;
+
+/// All light of a scene under one illumination.
+#[derive(Clone, Debug)]
+pub(crate) struct Field {
+    pub(crate) bodies: Bodies,
+    pub(crate) points: Vec<(DVec3, Rgb)>,
+    environment: Option<EnvironmentMap>,
+    board: Option<Board>,
+    /// Diffuse radiance of the spheres that have a colour of their own, by direction from the centre.
+    spheres: Vec<Option<Pyramid>>,
+}
+
+impl Field {
+    /// Lights every body of the scene: directly, then once more by the light that the other bodies throw back.
+    pub(crate) fn bake(scene: &Scene, illumination: Illumination) -> Result<Self, SceneError> {
+        let environment = match &scene.environment {
+            Some(light) if illumination.has_environment() => Some(EnvironmentMap::load(light)?),
+            _ => None,
+        };
+        let points = match illumination.has_points() {
+            true => scene.point_lights.iter().map(|l| (l.position.into(), rgb(l.intensity))).collect(),
+            false => Vec::new(),
+        };
+        let spheres = vec![None; scene.spheres.len()];
+        let dark = Self { bodies: Bodies::new(scene), points, environment, board: None, spheres };
+        let direct = dark.lit(scene);
+        let has_bounce = scene.spheres.iter().any(|s| s.diffuse.is_some());
+        Ok(if has_bounce { direct.lit(scene) } else { direct })
+    }
+
+    /// The same scene with bodies that reflect what arrives in this field.
+    fn lit(&self, scene: &Scene) -> Self {
+        let sharp = |place: &Place| self.from_points(place);
+        let board = scene.plane.as_ref().map(|plane| {
+            let place = |p| Place { position: p, normal: DVec3::Y, body: Body::Plane };
+            Board::new(plane, |p| self.smooth_irradiance(&place(p)), |p| sharp(&place(p)))
+        });
+        let texture = |(k, sphere): (usize, &crate::Sphere)| {
+            let albedo = rgb(sphere.diffuse?);
+            let (columns, rows) = (2 * SPHERE_ROWS, SPHERE_ROWS);
+            let texel = |i: usize| {
+                let unit = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
+                let normal = map_direction(unit(i % columns, columns), unit(i / columns, rows));
+                let place = Place { position: self.bodies.point(k, normal), normal, body: Body::Sphere(k) };
+                albedo * (self.smooth_irradiance(&place) + sharp(&place)) / PI
+            };
+            let texels = (0..columns * rows).into_par_iter().map(texel).collect();
+            Some(Pyramid::new(columns, rows, texels, true, |v| (std::f64::consts::PI * v).sin()))
+        };
+        let spheres = scene.spheres.iter().enumerate().map(texture).collect();
+        Self { board, spheres, ..self.clone() }
+    }
+
+    /// Irradiance from the point lights alone.
+    pub(crate) fn from_points(&self, place: &Place) -> Rgb {
+        self.points.iter().map(|light| from_point(&self.bodies, *light, place)).sum()
+    }
+
+    /// Irradiance from everything but the point lights.
+    pub(crate) fn smooth_irradiance(&self, place: &Place) -> Rgb {
+        let sky = self.environment.as_ref().map(|e| from_environment(&self.bodies, e, place));
+        let bodies = self.board.is_some() || self.spheres.iter().any(Option::is_some);
+        sky.unwrap_or(Rgb::ZERO) + if bodies { from_bodies(self, place) } else { Rgb::ZERO }
+    }
+
+    /// Radiance that arrives at a place from a unit direction, averaged over about `angle` radians. Point lights have
+    /// no extent and are never met; the environment's lamps are left to [`Field::lamps`].
+    pub(crate) fn incident(&self, place: &Place, direction: DVec3, angle: f64) -> Rgb {
+        self.body_radiance(place, direction, angle).unwrap_or_else(|| {
+            self.environment.as_ref().map_or(Rgb::ZERO, |e| e.dimmed_radiance(direction, angle))
+        })
+    }
+
+    /// The environment's lamps that are seen from a place: direction and irradiance on a surface that faces them.
+    pub(crate) fn lamps(&self, place: Place) -> impl Iterator<Item = (DVec3, Rgb)> {
+        let lamps = self.environment.as_ref().map_or(&[][..], |e| &e.lamps);
+        lamps.iter().copied().filter(move |(direction, _)| {
+            direction.dot(place.normal) > 0.0
+                && self.bodies.first(place.position, *direction, Some(place.body)).is_none()
+        })
+    }
+
+    /// Radiance of the body that is met in a direction; `None` where there is none.
+    pub(crate) fn body_radiance(&self, place: &Place, direction: DVec3, angle: f64) -> Option<Rgb> {
+        let (distance, body) = self.bodies.first(place.position, direction, Some(place.body))?;
+        let point = place.position + direction * distance;
+        Some(match body {
+            Body::Plane => {
+                // The footprint is stretched along the ray at grazing angles; a square of equal area stands for it.
+                let width = angle * distance / direction.y.abs().sqrt().max(0.05);
+                self.board.as_ref().map_or(Rgb::ZERO, |b| b.radiance(point, width))
+            }
+            Body::Sphere(k) => self.spheres[k].as_ref().map_or(Rgb::ZERO, |texture| {
+                let (u, v) = map_position(self.bodies.normal(k, point));
+                texture.sample(u, v, 1.0)
+            }),
+        })
+    }
+
+    /// What the camera sees along a ray that meets no sphere.
+    pub(crate) fn background(&self, eye: DVec3, direction: DVec3, angle: f64) -> Rgb {
+        match (self.bodies.first(eye, direction, None), &self.board) {
+            (Some((distance, Body::Plane)), Some(board)) => {
+                let place =
+                    Place { position: eye + direction * distance, normal: DVec3::Y, body: Body::Plane };
+                board.exact(place.position, self.from_points(&place))
+            }
+            _ => self.environment.as_ref().map_or(Rgb::ZERO, |e| e.radiance(direction, angle)),
+        }
+    }
+}

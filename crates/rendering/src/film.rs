@@ -1,0 +1,112 @@
+//! The camera's film: rays through sub-pixel positions and what of the subjects they meet.
+
+use glam::DVec3;
+
+use crate::bodies::{Bodies, Body};
+use crate::irradiance::Place;
+use crate::sampling::zero_two;
+use crate::scene::Camera;
+
+/// Sub-pixel samples of every pixel.
+pub(crate) const SUBSAMPLES: u32 = 16;
+
+/// A pinhole camera with a square film.
+#[derive(Clone, Debug)]
+pub(crate) struct Film {
+    pub(crate) eye: DVec3,
+    forward: DVec3,
+    /// Half of the film's width and height, at unit distance.
+    right: DVec3,
+    up: DVec3,
+    pub(crate) size: usize,
+}
+
+/// A visible point of a subject.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SurfacePoint {
+    pub(crate) place: Place,
+    pub(crate) sphere: usize,
+    /// Unit direction towards the eye.
+    pub(crate) wo: DVec3,
+}
+
+impl Film {
+    pub(crate) fn new(camera: &Camera, size: usize) -> Self {
+        let eye = DVec3::from(camera.eye);
+        let forward = (DVec3::from(camera.target) - eye).normalize();
+        let right = forward.cross(camera.up.into()).normalize();
+        let half = (camera.vertical_fov.to_radians() / 2.0).tan();
+        Self { eye, forward, right: right * half, up: right.cross(forward) * half, size }
+    }
+
+    /// Unit direction through a position on the film, in pixels from the top left corner.
+    pub(crate) fn direction(&self, x: f64, y: f64) -> DVec3 {
+        let scale = 2.0 / self.size as f64;
+        (self.forward + self.right * (x * scale - 1.0) + self.up * (1.0 - y * scale)).normalize()
+    }
+
+    /// Where a point appears on the film, in pixels from the top left corner; `None` behind the camera.
+    pub(crate) fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+        let to_point = point - self.eye;
+        let depth = to_point.dot(self.forward);
+        let on_film = |axis: DVec3| to_point.dot(axis) / (depth * axis.length_squared());
+        let half = self.size as f64 / 2.0;
+        (depth > 0.0).then(|| [half * (1.0 + on_film(self.right)), half * (1.0 - on_film(self.up))])
+    }
+
+    /// Directions through the first `count` sub-pixel positions of a pixel (row by row from the top left).
+    pub(crate) fn directions(&self, pixel: usize, count: u32) -> impl Iterator<Item = DVec3> {
+        let (x, y) = ((pixel % self.size) as f64, (pixel / self.size) as f64);
+        (0..count).map(move |i| {
+            let [dx, dy] = zero_two(i);
+            self.direction(x + dx, y + dy)
+        })
+    }
+
+    /// The points of subjects seen through the first `count` sub-pixel positions of a pixel; those that see none are
+    /// left out.
+    pub(crate) fn subject_points(&self, bodies: &Bodies, pixel: usize, count: u32) -> Vec<SurfacePoint> {
+        self.directions(pixel, count).filter_map(|d| self.subject_point(bodies, d)).collect()
+    }
+
+    fn subject_point(&self, bodies: &Bodies, direction: DVec3) -> Option<SurfacePoint> {
+        let (distance, Body::Sphere(sphere)) = bodies.first(self.eye, direction, None)? else { return None };
+        let position = self.eye + direction * distance;
+        let normal = bodies.normal(sphere, position);
+        let place = Place { position, normal, body: Body::Sphere(sphere) };
+        Some(SurfacePoint { place, sphere, wo: -direction })
+    }
+
+    /// Angle that a sub-pixel sample stands for, in radians.
+    pub(crate) fn sample_angle(&self) -> f64 {
+        2.0 * self.up.length() / self.size as f64 / f64::from(SUBSAMPLES).sqrt()
+    }
+}
+
+impl SurfacePoint {
+    /// The local frame of the sphere: tangent eastwards along the parallel, bitangent, normal.
+    pub(crate) fn frame(&self) -> [DVec3; 3] {
+        let normal = self.place.normal;
+        let tangent = DVec3::Y.cross(normal).try_normalize().unwrap_or(DVec3::X);
+        [tangent, normal.cross(tangent), normal]
+    }
+
+    /// The frame whose tangent lies in the plane of the view: all that an isotropic lobe needs.
+    pub(crate) fn view_frame(&self) -> [DVec3; 3] {
+        let normal = self.place.normal;
+        let tangent = (self.wo - normal * self.wo.dot(normal))
+            .try_normalize()
+            .unwrap_or_else(|| normal.any_orthonormal_vector());
+        [tangent, normal.cross(tangent), normal]
+    }
+}
+
+/// Coordinates of a direction in a frame.
+pub(crate) fn to_local(frame: &[DVec3; 3], w: DVec3) -> [f64; 3] {
+    frame.map(|axis| axis.dot(w))
+}
+
+/// The direction with given coordinates in a frame.
+pub(crate) fn to_world(frame: &[DVec3; 3], w: [f64; 3]) -> DVec3 {
+    frame[0] * w[0] + frame[1] * w[1] + frame[2] * w[2]
+}

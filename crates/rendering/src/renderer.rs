@@ -1,0 +1,233 @@
+//! The built-in renderer: a scene prepared for one illumination, and pictures of materials in it.
+
+use std::f32::consts::PI;
+
+use lookmatch_imaging::{Image, Mask};
+use lookmatch_materials::{Bsdf, Material, Role};
+use rayon::prelude::*;
+
+use crate::bodies::Body;
+use crate::field::Field;
+use crate::film::{Film, SUBSAMPLES, SurfacePoint};
+use crate::gather;
+use crate::highlights::Highlights;
+use crate::irradiance::Place;
+use crate::lobe_table::LobeTable;
+use crate::scene::{Illumination, Scene};
+use crate::transport::{PixelLight, gather_all};
+use crate::{Rgb, SceneError, rgb};
+
+/// Which part of a material is rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Diffuse and specular.
+    Full,
+    /// Diffuse only, every specular reflectance set to 0.
+    DiffuseOnly,
+}
+
+/// A scene prepared for one illumination and picture size.
+///
+/// Subject pixels are those that see a sphere; everything else is the same in every picture.
+pub struct Renderer {
+    field: Field,
+    film: Film,
+    /// What is seen beside the subjects, for every pixel.
+    background: Vec<Rgb>,
+    /// Indices of the subject pixels, ascending.
+    subjects: Vec<u32>,
+    diffuse: Vec<DiffuseLight>,
+    highlights: Highlights,
+    /// Prepared ring transport; without it, it is gathered anew for each picture.
+    transport: Option<Vec<PixelLight>>,
+    mask: Mask,
+}
+
+/// Light that leaves a subject pixel diffusely.
+#[derive(Clone, Copy, Debug)]
+struct DiffuseLight {
+    /// From spheres with a colour of their own.
+    own: Rgb,
+    /// From the others, for an albedo of 1.
+    white: Rgb,
+}
+
+impl Renderer {
+    /// Prepares a scene for pictures of `size` × `size` pixels (1 to 8192).
+    ///
+    /// Spheres keep their own diffuse colours; see [`Scene::for_model`] for materials that have none.
+    ///
+    /// # Errors
+    /// Where the scene lacks the light that is asked for, or its environment map cannot be read.
+    pub fn prepare(scene: &Scene, illumination: Illumination, size: usize) -> Result<Self, SceneError> {
+        scene.check()?;
+        if !(1..=8192).contains(&size) {
+            return Err(SceneError::Size { size });
+        }
+        let missing = |light| Err(SceneError::NoLight { scene: scene.name.clone(), light });
+        match illumination {
+            Illumination::Point if scene.point_lights.is_empty() => return missing("point light"),
+            Illumination::Environment if scene.environment.is_none() => return missing("environment"),
+            _ => {}
+        }
+        let field = Field::bake(scene, illumination)?;
+        let film = Film::new(&scene.camera, size);
+        let (background, hits) = look(&field, &film);
+        let subjects: Vec<u32> = (0..hits.len() as u32).filter(|i| hits[*i as usize]).collect();
+        let diffuse = subjects.par_iter().map(|p| diffuse_light(scene, &field, &film, *p as usize)).collect();
+        let highlights = Highlights::prepare(&field, &film, &subjects);
+        let mask = subject_mask(scene, &field, &film)?;
+        Ok(Self { field, film, background, subjects, diffuse, highlights, transport: None, mask })
+    }
+
+    /// Keeps the ring transport for all further pictures: about 1 KB per subject pixel.
+    pub fn keep_transport(mut self) -> Self {
+        self.transport = Some(gather_all(&self.field, &self.film, &self.subjects));
+        self
+    }
+
+    /// A picture of a material, linear RGB, row 0 on top.
+    pub fn render(&self, material: &Material, part: Part) -> Image {
+        let diffuse = self.diffuse_pixels(material);
+        let specular = match part {
+            Part::Full => self.specular_pixels(&*material.bsdf()),
+            Part::DiffuseOnly => vec![[0.0; 3]; self.subjects.len()],
+        };
+        let mut pixels: Vec<[f32; 3]> = self.background.iter().map(|b| [b.x, b.y, b.z]).collect();
+        for (k, pixel) in self.subjects.iter().enumerate() {
+            let out = &mut pixels[*pixel as usize];
+            (0..3).for_each(|c| out[c] += diffuse[k][c] + specular[k][c]);
+        }
+        let size = self.film.size;
+        let mut image = Image::new(size, size);
+        image.pixels_mut().copy_from_slice(&pixels);
+        image
+    }
+
+    /// Indices of the subject pixels in the picture, ascending.
+    pub fn subjects(&self) -> &[u32] {
+        &self.subjects
+    }
+
+    /// Side of the picture in pixels.
+    pub fn size(&self) -> usize {
+        self.film.size
+    }
+
+    /// Weights that fall from the middle of each sphere to its edge (Guarnera *et al.* 2018, 3.2); 0 elsewhere.
+    pub fn mask(&self) -> &Mask {
+        &self.mask
+    }
+
+    /// What the specular lobe adds to each subject pixel, linear RGB.
+    pub fn specular_pixels(&self, bsdf: &dyn Bsdf) -> Vec<[f32; 3]> {
+        if bsdf.sampling().is_none() {
+            return vec![[0.0; 3]; self.subjects.len()];
+        }
+        let array = |v: Rgb| [v.x, v.y, v.z];
+        if !bsdf.is_isotropic() {
+            let pixel = |(k, pixel): (usize, &u32)| {
+                let lobe = gather::radiance(&self.field, &self.film, *pixel as usize, bsdf, gather::SAMPLES);
+                array(lobe + self.highlights.radiance(k, bsdf))
+            };
+            return self.subjects.par_iter().enumerate().map(pixel).collect();
+        }
+        let lobe = LobeTable::new(bsdf);
+        let pixel = |(k, pixel): (usize, &u32)| {
+            let rings = match &self.transport {
+                Some(transport) => transport[k].radiance(&lobe),
+                None => PixelLight::gather(&self.field, &self.film, *pixel as usize).radiance(&lobe),
+            };
+            array(rings + self.highlights.radiance(k, bsdf))
+        };
+        self.subjects.par_iter().enumerate().map(pixel).collect()
+    }
+
+    /// What the diffuse term adds to each subject pixel, linear RGB.
+    pub fn diffuse_pixels(&self, material: &Material) -> Vec<[f32; 3]> {
+        let albedo = rgb(material.bsdf().diffuse());
+        let radiance = |d: &DiffuseLight| {
+            let sum = d.own + albedo * d.white;
+            [sum.x, sum.y, sum.z]
+        };
+        self.diffuse.iter().map(radiance).collect()
+    }
+
+    /// The direct integral of a lobe with a chosen number of samples: slow, and independent of the ring transport.
+    #[cfg(test)]
+    fn gathered_pixels(&self, bsdf: &dyn Bsdf, samples: u32) -> Vec<[f32; 3]> {
+        let pixel = |(k, pixel): (usize, &u32)| {
+            let lobe = gather::radiance(&self.field, &self.film, *pixel as usize, bsdf, samples);
+            let sum = lobe + self.highlights.radiance(k, bsdf);
+            [sum.x, sum.y, sum.z]
+        };
+        self.subjects.par_iter().enumerate().map(pixel).collect()
+    }
+}
+
+impl Scene {
+    /// The scene as materials of a model see it: without diffuse colours of the spheres where the model has no diffuse
+    /// reflectance.
+    pub fn for_model(&self, model: &lookmatch_materials::Model) -> Self {
+        let mut scene = self.clone();
+        if !model.parameters.iter().any(|p| p.role == Role::DiffuseReflectance) {
+            scene.spheres.iter_mut().for_each(|s| s.diffuse = None);
+        }
+        scene
+    }
+}
+
+/// What every pixel sees beside the subjects, and which pixels see a subject.
+fn look(field: &Field, film: &Film) -> (Vec<Rgb>, Vec<bool>) {
+    let pixel = |pixel: usize| {
+        let mut sum = Rgb::ZERO;
+        let mut hit = false;
+        for direction in film.directions(pixel, SUBSAMPLES) {
+            match field.bodies.first(film.eye, direction, None) {
+                Some((_, Body::Sphere(_))) => hit = true,
+                _ => sum += field.background(film.eye, direction, film.sample_angle()),
+            }
+        }
+        (sum / SUBSAMPLES as f32, hit)
+    };
+    (0..film.size * film.size).into_par_iter().map(pixel).unzip()
+}
+
+/// Diffuse light of one pixel. Point lights have hard shadows and are evaluated at each sub-pixel sample; the rest is
+/// smooth and evaluated once per sphere, at the mean of its samples.
+fn diffuse_light(scene: &Scene, field: &Field, film: &Film, pixel: usize) -> DiffuseLight {
+    let points = film.subject_points(&field.bodies, pixel, SUBSAMPLES);
+    let mut light = DiffuseLight { own: Rgb::ZERO, white: Rgb::ZERO };
+    for (sphere, description) in scene.spheres.iter().enumerate() {
+        let here: Vec<&SurfacePoint> = points.iter().filter(|p| p.sphere == sphere).collect();
+        let Some(first) = here.first() else { continue };
+        let normal = here.iter().map(|p| p.place.normal).sum::<glam::DVec3>().normalize();
+        let mean = Place { position: field.bodies.point(sphere, normal), normal, body: first.place.body };
+        let sharp: Rgb = here.iter().map(|p| field.from_points(&p.place)).sum();
+        let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
+        let radiance = irradiance / (SUBSAMPLES as f32 * PI);
+        match description.diffuse {
+            Some(own) => light.own += rgb(own) * radiance,
+            None => light.white += radiance,
+        }
+    }
+    light
+}
+
+/// The radial mask of every sphere. A sphere's image is nearly a disc: its centre is the image of the sphere's centre, its
+/// radius that of the disc of equal area.
+fn subject_mask(scene: &Scene, field: &Field, film: &Film) -> Result<Mask, SceneError> {
+    let size = film.size;
+    let sees = |pixel: usize, sphere: usize| {
+        let direction = film.direction((pixel % size) as f64 + 0.5, (pixel / size) as f64 + 0.5);
+        matches!(field.bodies.first(film.eye, direction, None), Some((_, Body::Sphere(s))) if s == sphere)
+    };
+    let mut mask = Mask::disc(size, size, 0.0, 0.0, 0.0);
+    for (k, sphere) in scene.spheres.iter().enumerate() {
+        let area = (0..size * size).into_par_iter().filter(|pixel| sees(*pixel, k)).count() as f64;
+        if let Some([x, y]) = film.project(sphere.centre.into()) {
+            mask = mask.union(&Mask::disc(size, size, x, y, (area / std::f64::consts::PI).sqrt()))?;
+        }
+    }
+    Ok(mask)
+}
