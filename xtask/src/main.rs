@@ -1,1 +1,168 @@
-fn main() {}
+//! `cargo xtask`: what is done to this project, as opposed to by it.
+
+use std::env;
+use std::process::{Command, ExitCode, Stdio};
+use std::time::Instant;
+
+const USAGE: &str = "\
+Usage: cargo xtask COMMAND
+
+Commands:
+  test   Check format, lints, tests and documentation; stop at the first failure
+  help   Print this text
+
+Exit codes: 0 all is well, 1 a step failed, 2 the command line is wrong";
+
+/// What must pass before a change goes in, quickest first.
+const STEPS: [Step; 4] = [
+    Step {
+        name: "format",
+        variable: None,
+        arguments: &["fmt", "--all", "--check"],
+        component: Some("rustfmt"),
+    },
+    Step {
+        name: "lints",
+        variable: None,
+        arguments: &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"],
+        component: Some("clippy"),
+    },
+    Step { name: "tests", variable: None, arguments: &["test", "--workspace", "--locked"], component: None },
+    Step {
+        name: "documentation",
+        variable: Some(("RUSTDOCFLAGS", "-D warnings")),
+        arguments: &["doc", "--workspace", "--no-deps", "--locked"],
+        component: None,
+    },
+];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] | ["help" | "-h" | "--help"] => {
+            println!("{USAGE}");
+            ExitCode::SUCCESS
+        }
+        ["test"] => match run_all(&STEPS, Step::run) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(message) => {
+                eprintln!("\nxtask: {message}");
+                ExitCode::FAILURE
+            }
+        },
+        [command @ ("test" | "help"), extra, ..] => {
+            eprintln!("xtask: '{command}' takes no arguments; found '{extra}'");
+            ExitCode::from(2)
+        }
+        [unknown, ..] => {
+            eprintln!("xtask: unknown command '{unknown}'; valid commands: test, help");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Runs the steps in order; the error names the first that fails and how to run it alone.
+fn run_all(steps: &[Step], mut run: impl FnMut(&Step) -> Result<(), String>) -> Result<(), String> {
+    let start = Instant::now();
+    let mut summary = Vec::new();
+    for step in steps {
+        eprintln!("\n=== {}: {}", step.name, step.command_line());
+        let begin = Instant::now();
+        let result = run(step);
+        let seconds = begin.elapsed().as_secs_f64();
+        result.map_err(|reason| {
+            format!(
+                "step '{}' failed after {seconds:.1} s: {reason}\nrun it alone: {}",
+                step.name,
+                step.command_line()
+            )
+        })?;
+        eprintln!("=== {}: passed in {seconds:.1} s", step.name);
+        summary.push(format!("{} {seconds:.1} s", step.name));
+    }
+    eprintln!("\nxtask: all passed in {:.1} s ({})", start.elapsed().as_secs_f64(), summary.join(", "));
+    Ok(())
+}
+
+/// One cargo command.
+struct Step {
+    name: &'static str,
+    /// An environment variable and its value.
+    variable: Option<(&'static str, &'static str)>,
+    arguments: &'static [&'static str],
+    /// The rustup component that provides the subcommand, where a minimal toolchain lacks it.
+    component: Option<&'static str>,
+}
+
+impl Step {
+    /// The step as a person would type it.
+    fn command_line(&self) -> String {
+        let variable = self.variable.map(|(name, value)| format!("{name}=\"{value}\" ")).unwrap_or_default();
+        format!("{variable}cargo {}", self.arguments.join(" "))
+    }
+
+    fn run(&self) -> Result<(), String> {
+        self.ensure_component()?;
+        match cargo().args(self.arguments).envs(self.variable).status() {
+            Ok(status) if status.success() => Ok(()),
+            Ok(status) => Err(status.to_string()),
+            Err(error) => Err(format!("cannot start cargo: {error}")),
+        }
+    }
+
+    /// Installs what the subcommand needs if it is missing and rustup can.
+    fn ensure_component(&self) -> Result<(), String> {
+        let Some(component) = self.component else { return Ok(()) };
+        let answers = || {
+            let mut version = cargo();
+            version.args([self.arguments[0], "--version"]).stdout(Stdio::null()).stderr(Stdio::null());
+            succeeds(&mut version)
+        };
+        if answers() {
+            return Ok(());
+        }
+        eprintln!("{component} is missing; trying: rustup component add {component}");
+        if succeeds(Command::new("rustup").args(["component", "add", component])) && answers() {
+            return Ok(());
+        }
+        Err(format!(
+            "{component} is missing and could not be added; install it with `rustup component add {component}` \
+             or, without rustup, from where Rust was installed"
+        ))
+    }
+}
+
+/// The cargo that runs this program, hence the same toolchain.
+fn cargo() -> Command {
+    Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+fn succeeds(command: &mut Command) -> bool {
+    command.status().is_ok_and(|status| status.success())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_is_named_and_nothing_runs_after_it() {
+        let mut started = Vec::new();
+        let message = run_all(&STEPS, |step| {
+            started.push(step.name);
+            if step.name == "lints" { Err("exit status: 101".into()) } else { Ok(()) }
+        })
+        .unwrap_err();
+        assert_eq!(started, ["format", "lints"]);
+        assert!(message.starts_with("step 'lints' failed after "), "{message}");
+        let alone = "run it alone: cargo clippy --workspace --all-targets --locked -- -D warnings";
+        assert!(message.ends_with(alone), "{message}");
+    }
+
+    #[test]
+    fn the_command_line_shows_the_variable() {
+        let documentation = STEPS.iter().find(|s| s.name == "documentation").unwrap();
+        let line = documentation.command_line();
+        assert_eq!(line, "RUSTDOCFLAGS=\"-D warnings\" cargo doc --workspace --no-deps --locked");
+    }
+}

@@ -1,2 +1,60 @@
-//! lookmatch
-fn main() {}
+//! The `lookmatch` program: a thin face over the libraries.
+//!
+//! Results go to standard output, messages and progress to standard error. Exit code 0 is success, 2 a request that makes
+//! no sense, 1 a failure to carry it out.
+
+mod args;
+mod commands;
+mod output;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+use lookmatch_materials::MaterialError;
+use lookmatch_remap::RemapError;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(arguments.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(exit_code(&error))
+        }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<()> {
+    match command {
+        Command::Models(args) => commands::models::run(&args),
+        Command::Eval(args) => commands::eval::run(&args),
+        Command::Render(args) => commands::render::run(&args),
+        Command::Remap(args) => commands::remap::run(&args),
+        Command::Apply(args) => commands::apply::run(&args),
+        Command::Inspect(args) => commands::inspect::run(&args),
+        Command::Compare(args) => commands::compare::run(&args),
+        Command::Validate(args) => commands::validate::run(&args),
+    }
+}
+
+/// A request that makes no sense, as opposed to one that failed.
+#[derive(Debug)]
+struct Usage(String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
+fn exit_code(error: &anyhow::Error) -> u8 {
+    let usage = error.is::<Usage>()
+        || error.is::<MaterialError>()
+        || error.downcast_ref::<RemapError>().is_some_and(RemapError::is_usage);
+    if usage { 2 } else { 1 }
+}

@@ -30,5 +30,5 @@ pub use geometry::Geometry;
 pub use material::{Material, Value};
 pub use model::{Alias, Model, Values};
 pub use models::{by_name, registry};
-pub use parameter::{Interval, Kind, Levels, Parameter, Role};
+pub use parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
 pub use real::Real;

@@ -1,1 +1,31 @@
-//! remap
+//! BRDF Difference Probes: what to search ([`Plan`]), how ([`remap()`]), the result ([`Probe`]), and how good it is
+//! ([`validate()`]).
+//!
+//! A probe maps the parameters of a source model to those of a target model, such that renderings of a reference
+//! scene look alike (Guarnera *et al.* 2018). The program never looks at either model's formula to find it: it compares
+//! pictures.
+
+mod apply;
+mod baseline;
+mod error;
+mod gallery;
+mod journal;
+mod plan;
+mod probe;
+mod stage;
+mod strategy;
+mod validate;
+
+pub use lookmatch_search::Axis;
+
+pub use apply::{Applied, apply};
+pub use baseline::Baseline;
+pub use error::RemapError;
+pub use journal::journal_path;
+pub use plan::{Assignment, Options, Plan, Preset, Side, Strategy, Vary};
+pub use probe::{Entry, Metric, Probe, Totals};
+pub use stage::{Appearance, Stage};
+pub use strategy::{Event, remap};
+pub use validate::{
+    Lighting, MethodScores, Scores, Statistics, ValidationReport, validate, validation_points,
+};

@@ -135,8 +135,16 @@ impl Run<'_> {
         let mut points: Vec<Point> = guesses.iter().map(|guess| self.bounds.clamp(guess)).collect();
         points.truncate(self.size);
         let missing = self.size - points.len();
+        if self.settings.start == Start::Near && !points.is_empty() {
+            let starts = points.len();
+            for k in 0..missing {
+                let near = sampling::unseen_near(&points[k % starts], &self.memo, &points, self.bounds, &mut self.rng);
+                points.extend(near);
+            }
+            return points.iter().map(genes).collect();
+        }
         points.extend(match self.settings.start {
-            Start::Uniform => sampling::uniform_points(missing, self.bounds, &mut self.rng),
+            Start::Uniform | Start::Near => sampling::uniform_points(missing, self.bounds, &mut self.rng),
             Start::Stratified => sampling::stratified_points(missing, self.bounds, &mut self.rng),
         });
         points.iter().map(genes).collect()

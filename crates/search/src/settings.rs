@@ -59,6 +59,9 @@ pub enum Duplicates {
 pub enum Start {
     /// Uniformly at random.
     Uniform,
+    /// Near the guesses: points never evaluated, a step or a few away from one of them in turn; without guesses,
+    /// uniformly.
+    Near,
     /// Latin hypercube: along every axis one individual in each of as many equal parts as there are
     /// individuals.
     Stratified,
@@ -205,6 +208,21 @@ impl GeneticSettings {
             polish_starts: 3,
             polish_radius: 3,
             ..GeneticSettings::guarnera2018()
+        }
+    }
+
+    /// For a search that goes on from a neighbour's result, given as a guess: a handful of individuals around the
+    /// guesses, then the descent. Costs a tenth of [`GeneticSettings::lookmatch`] and finds the basin that the
+    /// guesses lie in.
+    pub fn continued() -> GeneticSettings {
+        GeneticSettings {
+            population_per_axis: 2,
+            population_min: 6,
+            start: Start::Near,
+            stall_generations: 1,
+            polish_starts: 1,
+            polish_radius: 2,
+            ..GeneticSettings::lookmatch()
         }
     }
 

@@ -14,7 +14,7 @@ mod shared;
 pub mod ward;
 
 /// The catalogue, in the order in which it is shown.
-static MODELS: [&Model; 7] = [
+static MODELS: &[&Model] = &[
     &lambert::MODEL,
     &ward::MODEL,
     &ggx::MODEL,
@@ -26,7 +26,7 @@ static MODELS: [&Model; 7] = [
 
 /// All models.
 pub fn registry() -> &'static [&'static Model] {
-    &MODELS
+    MODELS
 }
 
 /// The model of a name.

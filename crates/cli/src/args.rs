@@ -1,0 +1,227 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use lookmatch_materials::Levels;
+use lookmatch_remap::{Assignment, Side, Vary};
+
+/// Finds the parameters of one material model that look like those of another.
+#[derive(Parser)]
+#[command(version, about, max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// List the material models and their parameters
+    Models(ModelsArgs),
+    /// Evaluate BRDFs at the points of a conformance file
+    Eval(EvalArgs),
+    /// Render a material in a scene
+    Render(RenderArgs),
+    /// Find the probe that maps one model to another
+    Remap(RemapArgs),
+    /// Map one material through a probe
+    Apply(ApplyArgs),
+    /// Say what is in a probe
+    Inspect(InspectArgs),
+    /// Render two materials side by side and measure their difference
+    Compare(CompareArgs),
+    /// Judge a probe in a scene that its search never saw
+    Validate(ValidateArgs),
+}
+
+#[derive(Args)]
+pub(crate) struct Json {
+    /// Print one JSON document to standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args)]
+pub(crate) struct ModelsArgs {
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct EvalArgs {
+    /// File of vectors: an object with a list `brdf` of {id, model, params, wi, wo}
+    pub(crate) vectors: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct RenderArgs {
+    /// reference, spheres, or a scene file (.toml)
+    pub(crate) scene: String,
+    /// MODEL:NAME=VALUE,..., JSON, or a .json file
+    #[arg(short, long)]
+    pub(crate) material: String,
+    /// point, env, env:FILE (.exr, .hdr), or all
+    #[arg(short, long, default_value = "all")]
+    pub(crate) light: String,
+    /// Side of the picture in pixels
+    #[arg(short, long, default_value_t = 300)]
+    pub(crate) size: usize,
+    /// Leave the specular lobe out
+    #[arg(long)]
+    pub(crate) diffuse_only: bool,
+    /// The picture: .exr (linear, exact) or .png (8 bit sRGB)
+    #[arg(short, long)]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum StrategyName {
+    /// Corresponding parameters grow together; searches start from their neighbours' results
+    Constrained,
+    /// Every source point on its own
+    Unconstrained,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum PresetName {
+    /// The paper's plausible ranges (index of refraction up to 1.85)
+    Paper,
+}
+
+#[derive(Args)]
+pub(crate) struct RemapArgs {
+    /// Source model, with fixed values if wanted: ward, ward:variant=duer
+    pub(crate) from: String,
+    /// Target model, with fixed values if wanted: ggx, ggx:masking=correlated
+    pub(crate) to: String,
+    /// How the results of neighbouring source points are used
+    #[arg(long, value_enum, default_value = "constrained")]
+    pub(crate) strategy: StrategyName,
+    /// genetic, exhaustive, genetic-guarnera2018 or genetic-deep2009
+    #[arg(long, default_value = "genetic")]
+    pub(crate) search: String,
+    /// Lattice of a parameter; without `source.` or `target.` before the name, the source's if it has one
+    #[arg(long, value_name = "NAME=MIN:MAX:STEP", value_parser = vary)]
+    pub(crate) vary: Vec<Vary>,
+    /// Hold a parameter at a value; the name as in --vary
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    pub(crate) fix: Vec<Assignment>,
+    /// Target ranges, instead of those that the source needs
+    #[arg(long, value_enum)]
+    pub(crate) preset: Option<PresetName>,
+    /// Seed of all random decisions
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Weight the middle of the sphere more than its silhouette (for models with and without Fresnel effect)
+    #[arg(long)]
+    pub(crate) mask: bool,
+    /// Side of the reference pictures in pixels; 300, or 128 with --quick
+    #[arg(long)]
+    pub(crate) size: Option<usize>,
+    /// Few source points and small pictures: a probe in seconds
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Validate too, and write tables and side-by-side pictures to this folder
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) report: Option<PathBuf>,
+    /// The probe file
+    #[arg(short, long)]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct ApplyArgs {
+    /// The probe file
+    pub(crate) probe: PathBuf,
+    /// Source parameters: NAME=VALUE
+    #[arg(required = true, value_name = "NAME=VALUE")]
+    pub(crate) values: Vec<String>,
+    /// Move values outside the probe's range to its nearest end
+    #[arg(long)]
+    pub(crate) clamp: bool,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct InspectArgs {
+    /// The probe file
+    pub(crate) probe: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct CompareArgs {
+    /// The material to look like
+    #[arg(long)]
+    pub(crate) source: String,
+    /// The material that should look like it
+    #[arg(long)]
+    pub(crate) target: String,
+    /// reference, spheres, or a scene file (.toml)
+    #[arg(long, default_value = "spheres")]
+    pub(crate) scene: String,
+    /// point, env, env:FILE (.exr, .hdr), or all
+    #[arg(long, default_value = "all")]
+    pub(crate) light: String,
+    /// Side of the pictures in pixels
+    #[arg(long, default_value_t = 300)]
+    pub(crate) size: usize,
+    /// Folder for the pictures and the numbers
+    #[arg(short, long)]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct ValidateArgs {
+    /// The probe file
+    pub(crate) probe: PathBuf,
+    /// Environment map instead of the shipped one (.exr, .hdr); may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub(crate) light: Vec<String>,
+    /// Number of source points, evenly spread; all of the probe's if not given
+    #[arg(long)]
+    pub(crate) points: Option<usize>,
+    /// Side of the pictures in pixels
+    #[arg(long, default_value_t = 300)]
+    pub(crate) size: usize,
+    /// Also write the result as JSON
+    #[arg(short, long)]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+/// Splits `source.name` or `target.name` from its side.
+fn side(name: &str) -> (Option<Side>, String) {
+    match name.split_once('.') {
+        Some(("source", rest)) => (Some(Side::Source), rest.to_owned()),
+        Some(("target", rest)) => (Some(Side::Target), rest.to_owned()),
+        _ => (None, name.to_owned()),
+    }
+}
+
+fn vary(text: &str) -> Result<Vary, String> {
+    let wrong = || "expected NAME=MIN:MAX:STEP with three numbers".to_owned();
+    let (name, lattice) = text.split_once('=').ok_or_else(wrong)?;
+    let numbers: Vec<f64> =
+        lattice.split(':').map(|n| n.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    let [min, max, step] = numbers[..] else { return Err(wrong()) };
+    let (side, name) = side(name.trim());
+    Ok(Vary { side, name, levels: Levels::new(min, max, step) })
+}
+
+fn assignment(text: &str) -> Result<Assignment, String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    let (side, name) = side(name.trim());
+    Ok(Assignment { side, name, value: value.trim().to_owned() })
+}

@@ -1,0 +1,120 @@
+//! `lookmatch inspect`: what is in a probe.
+
+use lookmatch_remap::{Axis, Entry, Probe};
+use serde_json::json;
+
+use crate::args::InspectArgs;
+use crate::output::{print, print_json, score, table};
+
+/// Worst points that are listed.
+const WORST: usize = 5;
+
+pub(crate) fn run(args: &InspectArgs) -> anyhow::Result<()> {
+    let probe = Probe::read(&args.probe)?;
+    if args.json.json { print_json(&summary(&probe)) } else { print(&text(&probe)) }
+}
+
+fn summary(probe: &Probe) -> serde_json::Value {
+    let axis = |(k, axis): (usize, &Axis)| axis_summary(probe, k, axis);
+    json!({
+        "from": probe.from, "to": probe.to, "program": probe.program, "version": probe.version,
+        "strategy": probe.strategy, "search": probe.search, "seed": probe.seed, "preset": probe.preset,
+        "metric": probe.metric, "scene": probe.scene.name, "size": probe.size,
+        "source_axes": probe.source_axes, "target_axes": probe.target_axes.iter().enumerate().map(axis).collect::<Vec<_>>(),
+        "entries": probe.entries.len(), "totals": probe.totals, "mean_fitness": mean(probe, |e| e.fitness),
+        "mean_nrmsd": channel_means(probe, |e| e.nrmsd),
+        "mean_nrmsd_masked": channel_means(probe, |e| e.nrmsd_masked),
+        "saturated": probe.entries.iter().filter(|e| !e.saturated.is_empty()).count(),
+        "worst": worst(probe).iter().map(|e| json!(e)).collect::<Vec<_>>(),
+    })
+}
+
+fn axis_summary(probe: &Probe, k: usize, axis: &Axis) -> serde_json::Value {
+    let found = || probe.entries.iter().map(move |e| e.target[k]);
+    json!({
+        "name": axis.name, "levels": axis.len(), "min": axis.value(0), "max": axis.value(axis.len() - 1),
+        "found_min": found().fold(f64::INFINITY, f64::min), "found_max": found().fold(f64::NEG_INFINITY, f64::max),
+        "saturated": probe.entries.iter().filter(|e| e.saturated.iter().any(|n| *n == axis.name)).count(),
+    })
+}
+
+fn text(probe: &Probe) -> String {
+    let mut text = format!(
+        "{} -> {}\n{}, {} search, seed {}, metric {}{}, scene {} at {} px\n\n",
+        probe.from,
+        probe.to,
+        match probe.strategy {
+            lookmatch_remap::Strategy::Constrained => "constrained",
+            lookmatch_remap::Strategy::Unconstrained => "unconstrained",
+        },
+        probe.search,
+        probe.seed,
+        probe.metric.name,
+        if probe.metric.mask { " with the radial mask" } else { "" },
+        probe.scene.name,
+        probe.size,
+    );
+    let header = ["", "levels", "from", "to", "found", "on the edge"].map(str::to_owned).to_vec();
+    let mut rows = vec![header];
+    for axis in &probe.source_axes {
+        rows.push(vec![
+            format!("source {}", axis.name),
+            axis.len().to_string(),
+            axis.value(0).to_string(),
+            axis.value(axis.len() - 1).to_string(),
+        ]);
+    }
+    for (k, axis) in probe.target_axes.iter().enumerate() {
+        let s = axis_summary(probe, k, axis);
+        rows.push(vec![
+            format!("target {}", axis.name),
+            axis.len().to_string(),
+            s["min"].to_string(),
+            s["max"].to_string(),
+            format!("{} to {}", s["found_min"], s["found_max"]),
+            s["saturated"].to_string(),
+        ]);
+    }
+    text += &table(&rows);
+    text += &format!(
+        "\n{} entries, {} comparisons ({:.1} % of the lattice each), mean fitness {}\n",
+        probe.entries.len(),
+        probe.totals.evaluations,
+        100.0 * mean(probe, |e| e.evaluations as f64) / probe.totals.lattice_points as f64,
+        score(mean(probe, |e| e.fitness)),
+    );
+    let channels = |value: fn(&Entry) -> [f64; 3]| channel_means(probe, value).map(score).join(" / ");
+    text += &format!(
+        "mean NRMSD {} (R/G/B), masked {}\n\nworst matches\n",
+        channels(|e| e.nrmsd),
+        channels(|e| e.nrmsd_masked)
+    );
+    for entry in worst(probe) {
+        let pairs = |axes: &[Axis], values: &[f64]| -> String {
+            let pair = |(axis, value): (&Axis, &f64)| format!("{}={value}", axis.name);
+            axes.iter().zip(values).map(pair).collect::<Vec<_>>().join(",")
+        };
+        text += &format!(
+            "  {} -> {}  fitness {}\n",
+            pairs(&probe.source_axes, &entry.source),
+            pairs(&probe.target_axes, &entry.target),
+            score(entry.fitness)
+        );
+    }
+    text
+}
+
+fn mean(probe: &Probe, value: impl Fn(&Entry) -> f64) -> f64 {
+    probe.entries.iter().map(value).sum::<f64>() / probe.entries.len() as f64
+}
+
+fn channel_means(probe: &Probe, value: impl Fn(&Entry) -> [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| mean(probe, |e| value(e)[c]))
+}
+
+fn worst(probe: &Probe) -> Vec<&Entry> {
+    let mut entries: Vec<&Entry> = probe.entries.iter().collect();
+    entries.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
+    entries.truncate(WORST);
+    entries
+}

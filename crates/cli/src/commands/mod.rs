@@ -1,0 +1,63 @@
+//! One file for each command, and what several of them read from the command line.
+
+pub(crate) mod apply;
+pub(crate) mod compare;
+pub(crate) mod eval;
+pub(crate) mod inspect;
+pub(crate) mod models;
+pub(crate) mod remap;
+pub(crate) mod render;
+pub(crate) mod validate;
+
+use std::path::Path;
+
+use anyhow::Context;
+use lookmatch_materials::Material;
+use lookmatch_rendering::{EnvironmentLight, Illumination, Scene};
+
+use crate::Usage;
+
+/// A material from its text, its JSON, or a .json file.
+pub(crate) fn material(text: &str) -> anyhow::Result<Material> {
+    if text.ends_with(".json") && !text.trim_start().starts_with('{') {
+        let content =
+            std::fs::read_to_string(text).with_context(|| format!("cannot read material file '{text}'"))?;
+        return Material::parse(&content).with_context(|| format!("material file '{text}'"));
+    }
+    Ok(Material::parse(text)?)
+}
+
+/// A scene under a light: `point`, `env`, `env:FILE` or `all`.
+pub(crate) fn lit_scene(scene: &str, light: &str) -> anyhow::Result<(Scene, Illumination)> {
+    let mut scene = Scene::load(scene)?;
+    let illumination = match light.split_once(':') {
+        Some(("env", file)) => {
+            scene.environment = Some(EnvironmentLight::of(file));
+            Illumination::Environment
+        }
+        None if light == "point" => Illumination::Point,
+        None if light == "env" => Illumination::Environment,
+        None if light == "all" => Illumination::All,
+        _ => {
+            return Err(Usage(format!("light '{light}' is unknown; use point, env, env:FILE or all")).into());
+        }
+    };
+    Ok((scene, illumination))
+}
+
+/// Creates a folder with its parents.
+pub(crate) fn create_folder(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot create folder '{}'", folder.display()))
+}
+
+/// Refuses an output whose folder does not exist, before any work is done.
+pub(crate) fn check_output(path: &Path) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        anyhow::bail!("cannot write '{}': there is no folder '{}'", path.display(), folder.display());
+    }
+    if path.is_dir() {
+        anyhow::bail!("cannot write '{}': it is a folder", path.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,111 @@
+//! `lookmatch remap`: from two models to a probe.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::Context;
+use lookmatch_materials::{Model, by_name};
+use lookmatch_remap::{
+    Assignment, Event, Options, Plan, Preset, Probe, Side, Stage, Strategy, journal_path, remap,
+};
+use serde_json::json;
+
+use crate::args::{PresetName, RemapArgs, StrategyName};
+use crate::commands::{check_output, create_folder};
+use crate::output::{bar, print_json, spinner};
+use crate::{Usage, report};
+
+pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
+    let (from, mut fix) = model(&args.from, Side::Source)?;
+    let (to, target_fix) = model(&args.to, Side::Target)?;
+    fix.extend(target_fix);
+    fix.extend(args.fix.iter().cloned());
+    let plan = Plan::new(from, to, &options(args, fix))?;
+    check_output(&args.output)?;
+    if let Some(folder) = &args.report {
+        create_folder(folder)?;
+    }
+    if from.has_fresnel != to.has_fresnel && !args.mask {
+        eprintln!(
+            "note: only one of the models has a Fresnel effect; --mask keeps silhouettes from ruling the match"
+        );
+    }
+    let started = Instant::now();
+    let probe = search(&plan, args)?;
+    probe.write(&args.output)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let saturated = probe.entries.iter().filter(|e| !e.saturated.is_empty()).count();
+    let mean = probe.entries.iter().map(|e| e.fitness).sum::<f64>() / probe.entries.len() as f64;
+    eprintln!(
+        "{}: {} source points in {seconds:.1} s, mean fitness {mean:.4}, {saturated} on the edge of a range",
+        args.output.display(),
+        probe.entries.len(),
+    );
+    let validation = match &args.report {
+        Some(folder) => Some(report::write(&probe, folder)?),
+        None => None,
+    };
+    if args.json.json {
+        let summary = json!({
+            "probe": args.output, "source_points": probe.entries.len(), "seconds": seconds,
+            "evaluations": probe.totals.evaluations, "lattice_points": probe.totals.lattice_points,
+            "mean_fitness": mean, "saturated": saturated, "validation": validation,
+        });
+        return print_json(&summary);
+    }
+    Ok(())
+}
+
+fn search(plan: &Plan, args: &RemapArgs) -> anyhow::Result<Probe> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = stopped.clone();
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+    let progress = spinner("preparing the reference scene");
+    let stage = Stage::prepare(plan)?;
+    progress.finish_and_clear();
+    let total = plan.source_axes.iter().map(|axis| axis.len()).product();
+    let progress = bar(total, "matching");
+    let mut observe = |event: Event| match event {
+        Event::Resumed { done } => {
+            progress.set_position(done as u64);
+            progress.suspend(|| eprintln!("going on after {done} source points of an earlier run"));
+        }
+        Event::Point { done, .. } => progress.set_position(done as u64),
+    };
+    let state = journal_path(&args.output);
+    let stop = || stopped.load(Ordering::Relaxed);
+    let probe = remap(plan, &stage, Some(&state), &mut observe, &stop)?;
+    progress.finish_and_clear();
+    Ok(probe)
+}
+
+fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
+    Options {
+        strategy: match args.strategy {
+            StrategyName::Constrained => Strategy::Constrained,
+            StrategyName::Unconstrained => Strategy::Unconstrained,
+        },
+        search: args.search.clone(),
+        vary: args.vary.clone(),
+        fix,
+        preset: args.preset.map(|PresetName::Paper| Preset::Paper),
+        seed: args.seed,
+        mask: args.mask,
+        quick: args.quick,
+        size: args.size,
+    }
+}
+
+/// A model with values to hold: `ward` or `ward:variant=duer`.
+fn model(text: &str, side: Side) -> anyhow::Result<(&'static Model, Vec<Assignment>)> {
+    let (name, list) = text.split_once(':').unwrap_or((text, ""));
+    let model = by_name(name)?;
+    let mut fix = Vec::new();
+    for item in list.split(',').filter(|item| !item.is_empty()) {
+        let (name, value) =
+            item.split_once('=').ok_or_else(|| Usage(format!("'{item}' in '{text}' is not NAME=VALUE")))?;
+        fix.push(Assignment { side: Some(side), name: name.trim().into(), value: value.trim().into() });
+    }
+    Ok((model, fix))
+}

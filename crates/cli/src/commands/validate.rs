@@ -1,0 +1,50 @@
+//! `lookmatch validate`: how good a probe is where its search never looked.
+
+use lookmatch_remap::{Probe, ValidationReport, validate, validation_points};
+
+use crate::Usage;
+use crate::args::ValidateArgs;
+use crate::commands::check_output;
+use crate::output::{bar, print, print_json};
+use crate::report::scores_table;
+
+pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
+    if args.points == Some(0) {
+        return Err(Usage("--points is 0; give 1 or more".into()).into());
+    }
+    let probe = Probe::read(&args.probe)?;
+    if let Some(output) = &args.output {
+        check_output(output)?;
+    }
+    let lights: Vec<Option<String>> = match args.light.as_slice() {
+        [] => vec![None],
+        files => files.iter().cloned().map(Some).collect(),
+    };
+    let points = validation_points(&probe, args.points);
+    let reports = lights
+        .iter()
+        .map(|light| with_progress(&probe, light, &points, args.size))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    if let Some(output) = &args.output {
+        let text = serde_json::to_string_pretty(&reports)?;
+        lookmatch_imaging::write_atomically(output, |out| out.write_all(text.as_bytes()))?;
+    }
+    if args.json.json {
+        return print_json(&reports);
+    }
+    let text: Vec<String> = reports.iter().map(scores_table).collect();
+    print(&text.join("\n"))
+}
+
+/// Validates under one light with a progress bar.
+pub(crate) fn with_progress(
+    probe: &Probe,
+    light: &Option<String>,
+    points: &[usize],
+    size: usize,
+) -> anyhow::Result<ValidationReport> {
+    let progress = bar(points.len(), "validating");
+    let report = validate(probe, light, points, size, &|| progress.inc(1))?;
+    progress.finish_and_clear();
+    Ok(report)
+}

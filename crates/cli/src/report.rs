@@ -1,0 +1,174 @@
+//! The report of a remap: tables and pictures in a folder, to be opened in a browser.
+
+use std::path::Path;
+
+use lookmatch_imaging::{Image, error_map, write as write_image, write_atomically};
+use lookmatch_materials::Material;
+use lookmatch_remap::{Baseline, MethodScores, Probe, ValidationReport, apply, validation_points};
+use lookmatch_rendering::{Illumination, Part, Renderer, Scene};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use crate::commands::validate::with_progress;
+use crate::output::{score, table};
+
+/// Side of the pictures in pixels.
+const SIZE: usize = 300;
+/// Where on each source axis the pictured materials lie, as shares of its length.
+const PICTURED: [f64; 2] = [0.2, 0.75];
+
+/// Validates a probe and writes `index.html`, `validation.json`, `validation.txt` and the pictures.
+pub(crate) fn write(probe: &Probe, folder: &Path) -> anyhow::Result<ValidationReport> {
+    let validation = with_progress(probe, &None, &validation_points(probe, None), SIZE)?;
+    let text = scores_table(&validation);
+    let file =
+        |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));
+    file("validation.json", &serde_json::to_string_pretty(&validation)?)?;
+    file("validation.txt", &text)?;
+    let scene = Scene::spheres().for_model(probe.from.model()).for_model(probe.to.model());
+    let renderer = Renderer::prepare(&scene, Illumination::All, SIZE)?.keep_transport();
+    let mut strips = Vec::new();
+    for (k, place) in pictured(probe).into_iter().enumerate() {
+        strips.push(strip(probe, &renderer, place, &folder.join(format!("match-{k}.png")))?);
+    }
+    file("index.html", &page(probe, &validation, &strips).into_string())?;
+    eprint!("{text}");
+    eprintln!("report in {}", folder.join("index.html").display());
+    Ok(validation)
+}
+
+/// The verdict as text: a block per kind of NRMSD, a row per method.
+pub(crate) fn scores_table(report: &ValidationReport) -> String {
+    let mut rows = vec![
+        ["NRMSD over the source points", "red", "", "", "", "green", "", "", "", "blue", "", "", ""]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    let header = ["min", "max", "mean", "sd"];
+    rows.push(std::iter::once("").chain(header).chain(header).chain(header).map(str::to_owned).collect());
+    for (title, masked) in [("whole image", false), ("masked", true)] {
+        for method in &report.methods {
+            let mut row = vec![format!("{title}: {}", method.method)];
+            row.extend(numbers(method, masked));
+            rows.push(row);
+        }
+    }
+    let verdict = match (report.probe_is_best, report.methods.len()) {
+        (_, 1) => "no baseline applies to these models",
+        (true, _) => "the probe beats every baseline on the mean masked NRMSD",
+        (false, _) => "a baseline beats the probe on the mean masked NRMSD",
+    };
+    let scene = format!("scene {}, environment {}", report.scene, report.environment);
+    format!("{scene}, {} source points, {} px\n{}{verdict}\n", report.points, report.size, table(&rows))
+}
+
+/// Min, max, mean and standard deviation of each channel.
+fn numbers(method: &MethodScores, masked: bool) -> Vec<String> {
+    let channels = if masked { &method.scores.masked } else { &method.scores.whole };
+    channels.iter().flat_map(|s| [s.min, s.max, s.mean, s.sd].map(score)).collect()
+}
+
+/// Entries to picture: low and high on each axis.
+fn pictured(probe: &Probe) -> Vec<usize> {
+    let counts: Vec<usize> = probe.source_axes.iter().map(|a| a.len()).collect();
+    let corner = |bits: usize| {
+        counts.iter().enumerate().fold(0, |place, (k, n)| {
+            let share = PICTURED[bits >> k & 1];
+            place * n + (share * (n - 1) as f64).round() as usize
+        })
+    };
+    let mut places: Vec<usize> = (0..1 << counts.len().min(3)).map(corner).collect();
+    places.sort_unstable();
+    places.dedup();
+    places
+}
+
+/// One source material with everything that should look like it.
+struct Strip {
+    file: String,
+    source: Material,
+    target: Material,
+    columns: Vec<&'static str>,
+}
+
+/// Renders source, probe, baselines and the probe's error map beside each other.
+fn strip(probe: &Probe, renderer: &Renderer, place: usize, path: &Path) -> anyhow::Result<Strip> {
+    let source = probe.source_material(&probe.entries[place].source)?;
+    let target = apply(probe, &source, false)?.target;
+    let mut columns = vec!["source", "probe"];
+    let mut images = vec![renderer.render(&source, Part::Full), renderer.render(&target, Part::Full)];
+    let (map, _) = error_map(&images[0], &images[1], None)?;
+    for rule in Baseline::ALL {
+        if let Some(material) = rule.apply(&source, &probe.to)? {
+            columns.push(rule.title());
+            images.push(renderer.render(&material, Part::Full));
+        }
+    }
+    columns.push("error of the probe");
+    images.push(map);
+    let all: Vec<&Image> = images.iter().collect();
+    write_image(path, &Image::beside(&all), &[])?;
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Strip { file, source, target, columns })
+}
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1500px;margin:2rem auto;padding:0 1rem;\
+color:#222;background:#fafafa}table{border-collapse:collapse;font-variant-numeric:tabular-nums;display:block;\
+overflow-x:auto}td,th{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}td:first-child{text-align:left}\
+tr.probe td{font-weight:600}img{width:100%;image-rendering:auto;display:block}figure{margin:1.5rem 0}\
+.heads{display:flex}.heads span{flex:1;text-align:center;color:#555}code{background:#eee;padding:0 .3em}";
+
+fn page(probe: &Probe, validation: &ValidationReport, strips: &[Strip]) -> Markup {
+    let title = format!("{} to {}", probe.from.model().title, probe.to.model().title);
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width,initial-scale=1";
+                title { (title) " - lookmatch" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (title) }
+                p {
+                    (probe.entries.len()) " source materials; metric " code { (probe.metric.name) }
+                    @if probe.metric.mask { " with the radial mask" }
+                    "; " (probe.program) ", seed " (probe.seed) "."
+                }
+                h2 { "Under light that the search never saw" }
+                p {
+                    "Scene " code { (validation.scene) } ", environment " code { (validation.environment) } ", "
+                    (validation.points) " source points. NRMSD per channel: lower is better. "
+                    @if validation.probe_is_best { "The probe beats every baseline on the mean masked NRMSD." }
+                    @else { "A baseline beats the probe on the mean masked NRMSD." }
+                }
+                (scores(validation))
+                h2 { "Side by side" }
+                @for strip in strips {
+                    figure {
+                        div.heads { @for column in &strip.columns { span { (column) } } }
+                        img src=(strip.file) alt=(format!("{} beside {}", strip.source, strip.target));
+                        figcaption { code { (strip.source) } " becomes " code { (strip.target) } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn scores(validation: &ValidationReport) -> Markup {
+    html! {
+        table {
+            tr { th {} @for channel in ["red", "green", "blue"] { th colspan="4" { (channel) } } }
+            tr { th {} @for _ in 0..3 { @for name in ["min", "max", "mean", "σ"] { th { (name) } } } }
+            @for (title, masked) in [("whole image", false), ("masked", true)] {
+                @for method in &validation.methods {
+                    tr.probe[method.method == "probe"] {
+                        td { (title) ": " (method.method) }
+                        @for number in numbers(method, masked) { td { (number) } }
+                    }
+                }
+            }
+        }
+    }
+}

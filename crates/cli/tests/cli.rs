@@ -1,0 +1,294 @@
+//! What a user does at the command line, and what the program says when it cannot be done.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value as Json;
+use tempfile::TempDir;
+
+fn lookmatch(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lookmatch")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+/// Runs a command that must succeed and print one JSON document.
+fn json(folder: &Path, arguments: &[&str]) -> Json {
+    let output = lookmatch(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Runs a command that must fail with an exit code and one message that holds all of some words.
+fn refused(folder: &Path, arguments: &[&str], code: i32, words: &[&str]) {
+    let output = lookmatch(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
+    assert!(!message.contains("panicked"), "{arguments:?}: {message}");
+    for word in words {
+        assert!(message.contains(word), "{arguments:?}: no '{word}' in: {message}");
+    }
+    assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
+}
+
+/// A probe of 2 × 3 source points from tiny pictures.
+const REMAP: &[&str] = &[
+    "remap",
+    "ward",
+    "ggx",
+    "--vary",
+    "specular=0.04:0.08:0.04",
+    "--vary",
+    "roughness=0.1:0.3:0.1",
+    "--size",
+    "32",
+];
+
+fn with<'a>(arguments: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+    [arguments, more].concat()
+}
+
+#[test]
+fn the_catalogue_describes_every_parameter() {
+    let folder = TempDir::new().unwrap();
+    let models = json(folder.path(), &["models", "--json"]);
+    let ward = models.as_array().unwrap().iter().find(|m| m["name"] == "ward").unwrap();
+    let roughness = &ward["parameters"].as_array().unwrap()[2];
+    assert_eq!(
+        (roughness["name"].as_str(), roughness["role"].as_str()),
+        (Some("roughness_u"), Some("roughness"))
+    );
+    assert_eq!(roughness["range"]["search"]["step"], 0.01);
+    let text = lookmatch(folder.path(), &["models"]);
+    assert!(String::from_utf8_lossy(&text.stdout).contains("roughness sets roughness_u and roughness_v"));
+}
+
+#[test]
+fn vectors_are_evaluated_and_unknown_models_are_null() {
+    let folder = TempDir::new().unwrap();
+    let up = "[0,0,1]";
+    let vectors = format!(
+        r#"{{"brdf":[{{"id":7,"model":"lambert","params":{{"kd":0.5}},"wi":{up},"wo":{up}}},
+            {{"id":"x","model":"velvet","params":{{}},"wi":{up},"wo":{up}}}]}}"#
+    );
+    std::fs::write(folder.path().join("v.json"), vectors).unwrap();
+    let values = json(folder.path(), &["eval", "v.json", "--json"]);
+    assert!((values["brdf"][0]["f"].as_f64().unwrap() - 0.5 / std::f64::consts::PI).abs() < 1e-15);
+    assert_eq!(values["brdf"][1], serde_json::json!({"id": "x", "f": null}));
+    std::fs::write(folder.path().join("bad.json"), "{\"brdf\": 3}").unwrap();
+    refused(folder.path(), &["eval", "bad.json", "--json"], 1, &["bad.json"]);
+}
+
+#[test]
+fn a_picture_is_the_same_on_any_number_of_threads() {
+    let folder = TempDir::new().unwrap();
+    for (threads, name) in [("1", "one.exr"), ("3", "three.exr")] {
+        let status = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
+            .current_dir(&folder)
+            .env("RAYON_NUM_THREADS", threads)
+            .args(["render", "reference", "--material", "ggx:ior=1.6,roughness=0.1", "--light", "env"])
+            .args(["--size", "24", "-o", name])
+            .status()
+            .unwrap();
+        assert!(status.success());
+    }
+    let image = |name: &str| lookmatch_imaging::read(&folder.path().join(name)).unwrap();
+    assert_eq!(image("one.exr"), image("three.exr"));
+    assert!(image("one.exr").pixels().iter().flatten().any(|v| *v > 0.1));
+}
+
+#[test]
+fn a_probe_is_found_applied_inspected_and_judged() {
+    let folder = TempDir::new().unwrap();
+    let made = json(folder.path(), &with(REMAP, &["--mask", "--report", "report", "-o", "p.json", "--json"]));
+    assert_eq!(made["source_points"], 6);
+    assert!(!folder.path().join("p.json.partial").exists(), "finished work leaves no state behind");
+    for file in ["index.html", "validation.json", "validation.txt", "match-0.png"] {
+        assert!(folder.path().join("report").join(file).is_file(), "{file} is missing in the report");
+    }
+
+    let applied = json(folder.path(), &["apply", "p.json", "specular=0.06", "roughness=0.15", "--json"]);
+    let ior = applied["target"]["ior"].as_f64().unwrap();
+    assert!((1.4..2.0).contains(&ior), "F0 = 0.06 is an index near 1.65, not {ior}");
+    assert!((applied["target"]["roughness_u"].as_f64().unwrap() - 0.15).abs() < 0.05);
+    let coloured = &["apply", "p.json", "specular=0.04", "roughness=0.1", "diffuse=0.1/0.2/0.3", "--json"];
+    assert_eq!(json(folder.path(), coloured)["target"]["diffuse"], serde_json::json!([0.1, 0.2, 0.3]));
+
+    refused(
+        folder.path(),
+        &["apply", "p.json", "specular=0.06", "roughness=0.5"],
+        2,
+        &["roughness = 0.5", "[0.1, 0.3]", "--clamp"],
+    );
+    let clamped =
+        json(folder.path(), &["apply", "p.json", "specular=0.06", "roughness=0.5", "--clamp", "--json"]);
+    assert_eq!(clamped["clamped"], serde_json::json!(["roughness"]));
+    refused(folder.path(), &["apply", "p.json", "specular=0.06"], 2, &["roughness=0.1 to 0.3"]);
+    refused(
+        folder.path(),
+        &["apply", "p.json", "specula=0.06", "roughness=0.1"],
+        2,
+        &["did you mean 'specular'?"],
+    );
+
+    let inspected = json(folder.path(), &["inspect", "p.json", "--json"]);
+    assert_eq!((inspected["entries"].as_u64(), inspected["metric"]["mask"].as_bool()), (Some(6), Some(true)));
+    let judged = json(folder.path(), &["validate", "p.json", "--points", "2", "--size", "48", "--json"]);
+    let methods: Vec<&str> =
+        judged[0]["methods"].as_array().unwrap().iter().map(|m| m["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["probe", "copy", "copy, no Fresnel"]);
+    assert_eq!(judged[0]["points"], 2);
+}
+
+#[test]
+fn equal_models_map_onto_themselves() {
+    let folder = TempDir::new().unwrap();
+    let jobs: [&[&str]; 2] = [
+        &["remap", "ggx", "ggx", "--vary", "ior=1.3:1.9:0.3", "--vary", "roughness=0.05:0.45:0.2"],
+        &["remap", "ward", "ward", "--vary", "specular=0.05:0.25:0.1", "--vary", "roughness=0.05:0.45:0.2"],
+    ];
+    for job in jobs {
+        for strategy in ["constrained", "unconstrained"] {
+            json(
+                folder.path(),
+                &with(job, &["--size", "24", "--strategy", strategy, "-o", "same.json", "--json"]),
+            );
+            let probe: Json =
+                serde_json::from_str(&std::fs::read_to_string(folder.path().join("same.json")).unwrap())
+                    .unwrap();
+            for entry in probe["entries"].as_array().unwrap() {
+                let target = entry["target"].as_array().unwrap();
+                assert_eq!(entry["fitness"], 0.0, "{entry}");
+                // GGX has its switch before the two searched values.
+                assert_eq!(entry["source"].as_array().unwrap()[..], target[target.len() - 2..], "{entry}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_interrupted_remap_goes_on_where_it_stopped() {
+    let folder = TempDir::new().unwrap();
+    let job = [
+        "remap",
+        "ward",
+        "ggx",
+        "--size",
+        "32",
+        "--vary",
+        "specular=0.02:0.4:0.02",
+        "--fix",
+        "roughness=0.2",
+    ];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
+        .current_dir(&folder)
+        .args(with(&job, &["-o", "p.json"]))
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let state = folder.path().join("p.json.partial");
+    let lines = || std::fs::read_to_string(&state).map_or(0, |text| text.lines().count());
+    while lines() < 3 && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let code = child.wait().unwrap().code();
+    // On a fast machine the work may be over before the signal arrives.
+    if code != Some(0) {
+        assert_eq!(code, Some(1));
+        assert!(lines() >= 3 && !folder.path().join("p.json").exists());
+        let resumed = lookmatch(folder.path(), &with(&job, &["-o", "p.json"]));
+        assert!(resumed.status.success());
+    }
+    json(folder.path(), &with(&job, &["-o", "whole.json", "--json"]));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    assert_eq!(read("p.json"), read("whole.json"));
+}
+
+#[test]
+fn bad_requests_are_refused_with_what_would_be_accepted() {
+    let folder = TempDir::new().unwrap();
+    let render = |more: &[&'static str]| with(&["render", "reference", "--size", "8", "-o", "out.exr"], more);
+    let of = folder.path();
+    refused(of, &render(&["--material", "wrad"]), 2, &["did you mean 'ward'?"]);
+    refused(of, &render(&["--material", "ward:roughness=2"]), 2, &["roughness_u", "[0.001, 1]"]);
+    refused(of, &render(&["--material", "ward:specular=nan"]), 2, &["specular", "[0, 1]"]);
+    refused(of, &render(&["--material", "missing.json"]), 1, &["missing.json"]);
+    refused(of, &render(&["--material", "ward", "--light", "sun"]), 2, &["point, env, env:FILE or all"]);
+    refused(of, &render(&["--material", "ward", "--light", "env:none.exr"]), 1, &["none.exr"]);
+    refused(
+        of,
+        &["render", "reference", "--material", "ward", "--size", "0", "-o", "out.exr"],
+        1,
+        &["1 to 8192"],
+    );
+    refused(
+        of,
+        &["render", "reference", "--material", "ward", "--size", "8", "-o", "out.jpg"],
+        1,
+        &[".exr and .png"],
+    );
+    refused(of, &["render", "reference", "--material", "ward", "-o", "no/out.exr"], 1, &["no folder"]);
+    refused(of, &["render", "scene.toml", "--material", "ward", "-o", "out.exr"], 1, &["scene.toml"]);
+    refused(of, &["remap", "ward", "ggx", "--vary", "ior=1.5", "-o", "p.json"], 2, &["NAME=MIN:MAX:STEP"]);
+    refused(
+        of,
+        &["remap", "ward", "ggx", "--vary", "roughness=0.5:0.1:0.1", "-o", "p.json"],
+        2,
+        &["roughness"],
+    );
+    refused(
+        of,
+        &["remap", "ward", "ggx", "--vary", "roughness=0:0.5:0.1", "-o", "p.json"],
+        2,
+        &["[0.001, 1]"],
+    );
+    refused(of, &["remap", "ward", "ggx", "--fix", "ro=0.1", "-o", "p.json"], 2, &["parameter 'ro'"]);
+    refused(of, &["remap", "ward", "ggx", "--search", "exaustive", "-o", "p.json"], 2, &["exhaustive"]);
+    refused(of, &["apply", "none.json", "specular=0.1"], 1, &["none.json"]);
+    let left: Vec<_> = std::fs::read_dir(of).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.is_empty(), "failures left {left:?} behind");
+}
+
+#[test]
+fn damaged_pictures_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    let map = lookmatch_imaging::Image::from_fn(8, 4, |x, y| [x as f32, y as f32, 1.0]);
+    lookmatch_imaging::write(&of.join("map.exr"), &map, &[]).unwrap();
+    let render = |light: &'static str| {
+        ["render", "reference", "--material", "ward", "--size", "8", "--light", light, "-o", "o.exr"]
+    };
+    assert!(lookmatch(of, &render("env:map.exr")).status.success());
+    let bytes = std::fs::read(of.join("map.exr")).unwrap();
+    std::fs::write(of.join("cut.exr"), &bytes[..bytes.len() / 2]).unwrap();
+    refused(of, &render("env:cut.exr"), 1, &["cut.exr"]);
+    let square = lookmatch_imaging::Image::new(4, 4);
+    lookmatch_imaging::write(&of.join("square.exr"), &square, &[]).unwrap();
+    refused(of, &render("env:square.exr"), 1, &["square.exr", "4 x 4", "twice as wide"]);
+    std::fs::write(of.join("text.hdr"), "not a picture").unwrap();
+    refused(of, &render("env:text.hdr"), 1, &["text.hdr"]);
+}
+
+#[test]
+fn damaged_probes_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    let tiny =
+        ["remap", "ward", "ggx", "--size", "16", "--vary", "specular=0.1:0.1:0.1", "--fix", "roughness=0.2"];
+    json(of, &with(&tiny, &["-o", "p.json", "--json"]));
+    let good: Json = serde_json::from_str(&std::fs::read_to_string(of.join("p.json")).unwrap()).unwrap();
+    let damaged = |change: &dyn Fn(&mut Json), words: &[&str]| {
+        let mut probe = good.clone();
+        change(&mut probe);
+        std::fs::write(of.join("bad.json"), probe.to_string()).unwrap();
+        refused(of, &["inspect", "bad.json"], 1, &[&["bad.json"], words].concat());
+    };
+    damaged(&|p| p["version"] = 2.into(), &["version is 2", "up to 1"]);
+    damaged(&|p| p["format"] = "recipe".into(), &["lookmatch-probe"]);
+    damaged(&|p| drop(p.as_object_mut().unwrap().remove("entries")), &["missing field", "entries"]);
+    damaged(&|p| p["entries"] = serde_json::json!([]), &["0 entries", "1 points"]);
+    damaged(&|p| p["from"]["model"] = "wrad".into(), &["did you mean 'ward'?"]);
+    damaged(&|p| p["entries"][0]["target"][1] = 0.5.into(), &["ior", "outside its range"]);
+    damaged(&|p| p["entries"][0]["fitness"] = Json::Null, &["fitness"]);
+    std::fs::write(of.join("cut.json"), "{\"format\": \"lookmatch-probe\"").unwrap();
+    refused(of, &["apply", "cut.json", "specular=0.1"], 1, &["cut.json", "not JSON"]);
+}

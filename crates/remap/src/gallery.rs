@@ -1,0 +1,116 @@
+//! Target materials that were rendered already: the paper's database of renderings, in memory and bounded.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+use lookmatch_materials::{Material, Parameter, Role, Value};
+use lookmatch_search::{Objective, ObjectiveError, Point};
+use lru::LruCache;
+
+use crate::stage::{Appearance, Stage};
+use crate::{Plan, RemapError};
+
+/// Memory for kept appearances, in bytes.
+const CAPACITY: usize = 500 << 20;
+
+/// What a specular appearance depends on: the bits of every value but the diffuse reflectance; empty without a lobe.
+type Key = Vec<u64>;
+
+fn key(material: &Material) -> Key {
+    if material.bsdf().sampling().is_none() {
+        return Key::new();
+    }
+    let bits = |(parameter, value): (&Parameter, &Value)| match value {
+        _ if parameter.role == Role::DiffuseReflectance => Vec::new(),
+        Value::Number(v) => vec![v.to_bits()],
+        Value::Colour(c) => c.map(f64::to_bits).to_vec(),
+        Value::Choice(name) => name.bytes().map(u64::from).collect(),
+    };
+    material.model().parameters.iter().zip(material.values()).flat_map(bits).collect()
+}
+
+/// The most recently used target appearances.
+pub(crate) struct Gallery<'a> {
+    plan: &'a Plan,
+    stage: &'a Stage,
+    lattice: &'a lookmatch_search::Lattice,
+    kept: LruCache<Key, Arc<Appearance>>,
+    /// How many targets were rendered, again or for the first time.
+    pub(crate) renders: usize,
+}
+
+impl<'a> Gallery<'a> {
+    pub(crate) fn new(plan: &'a Plan, stage: &'a Stage, lattice: &'a lookmatch_search::Lattice) -> Self {
+        let size = stage.appearance(&plan.to.diffuse_only()).bytes().max(1);
+        let count = NonZeroUsize::new(CAPACITY / size).unwrap_or(NonZeroUsize::MIN);
+        Self { plan, stage, lattice, kept: LruCache::new(count), renders: 0 }
+    }
+
+    /// A source material as it is seen.
+    pub(crate) fn appearance(&self, source: &Material) -> Appearance {
+        self.stage.appearance(source)
+    }
+
+    /// Target materials at some points beside a source, with their appearances.
+    fn look(
+        &mut self,
+        source: &Material,
+        points: &[Point],
+    ) -> Result<Vec<(Material, Arc<Appearance>)>, RemapError> {
+        let materials = points
+            .iter()
+            .map(|p| self.plan.target_material(source, &self.lattice.values(p)))
+            .collect::<Result<Vec<_>, _>>()?;
+        let wanted: Vec<Key> = materials.iter().map(key).collect();
+        let mut missing: Vec<(Key, Material)> = Vec::new();
+        for (key, material) in wanted.iter().zip(&materials) {
+            if !self.kept.contains(key) && missing.iter().all(|(known, _)| known != key) {
+                missing.push((key.clone(), material.clone()));
+            }
+        }
+        let (keys, new): (Vec<_>, Vec<_>) = missing.into_iter().unzip();
+        self.renders += new.len();
+        let rendered = self.stage.appearances(&new).into_iter().map(Arc::new);
+        let fresh: Vec<(Key, Arc<Appearance>)> = keys.into_iter().zip(rendered).collect();
+        // Everything is looked up before anything is stored: a large batch must not push out its own members.
+        let mut seen = Vec::with_capacity(points.len());
+        for (key, material) in wanted.iter().zip(materials) {
+            let new = fresh.iter().find(|(k, _)| k == key).map(|(_, appearance)| appearance.clone());
+            let appearance = new.or_else(|| self.kept.get(key).cloned());
+            let appearance = appearance.unwrap_or_else(|| Arc::new(self.stage.appearance(&material)));
+            seen.push((material, appearance));
+        }
+        for (key, appearance) in fresh {
+            self.kept.put(key, appearance);
+        }
+        Ok(seen)
+    }
+}
+
+/// The fitness of target points against one source material.
+pub(crate) struct Match<'a, 'b> {
+    pub(crate) gallery: &'a mut Gallery<'b>,
+    pub(crate) source: &'a Material,
+    pub(crate) appearance: &'a Appearance,
+    /// Asked before each batch; true stops the search.
+    pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// The search was stopped from outside.
+#[derive(Debug, thiserror::Error)]
+#[error("stopped")]
+pub(crate) struct Stopped;
+
+impl Objective for Match<'_, '_> {
+    fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, ObjectiveError> {
+        use rayon::prelude::*;
+        if (self.stop)() {
+            return Err(Box::new(Stopped));
+        }
+        let targets = self.gallery.look(self.source, points)?;
+        let stage = self.gallery.stage;
+        let fitness =
+            |(m, a): &(Material, Arc<Appearance>)| stage.fitness((self.source, self.appearance), (m, a));
+        Ok(targets.par_iter().map(fitness).collect())
+    }
+}

@@ -1,0 +1,208 @@
+//! The probe file: JSON, versioned, documented in `docs/probe-format.md`.
+
+use std::path::Path;
+
+use lookmatch_imaging::{FitnessWeights, Reduce, Space, write_atomically};
+use lookmatch_materials::Material;
+use lookmatch_rendering::Scene;
+use lookmatch_search::Axis;
+use serde::{Deserialize, Serialize};
+
+use crate::plan::{Plan, Preset, Strategy};
+use crate::{RemapError, plan};
+
+/// Version of the file format that is written; older ones are read, newer ones refused.
+const VERSION: u32 = 1;
+const FORMAT: &str = "lookmatch-probe";
+
+/// A BRDF Difference Probe: for each tabulated source point, the target parameters that look most like it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Probe {
+    /// `lookmatch-probe`.
+    pub format: String,
+    /// Version of the format.
+    pub version: u32,
+    /// Program and version that wrote the file.
+    pub program: String,
+    /// Source model with the parameters that did not vary.
+    pub from: Material,
+    /// Target model with the parameters that were not searched.
+    pub to: Material,
+    /// Tabulated source parameters, the slowest first.
+    pub source_axes: Vec<Axis>,
+    /// Searched target parameters.
+    pub target_axes: Vec<Axis>,
+    /// How neighbours were used.
+    pub strategy: Strategy,
+    /// Search method.
+    pub search: String,
+    /// Target ranges.
+    pub preset: Option<Preset>,
+    /// Seed.
+    pub seed: u64,
+    /// What was minimised.
+    pub metric: Metric,
+    /// The scene that was compared.
+    pub scene: Scene,
+    /// Side of its pictures in pixels.
+    pub size: usize,
+    /// Sums over the whole remap.
+    pub totals: Totals,
+    /// One entry per source point, in lexicographic order of the source axes.
+    pub entries: Vec<Entry>,
+}
+
+/// Identity of the metric.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Metric {
+    /// `guarnera-2018-eq3`.
+    pub name: String,
+    /// Colour space of the differences.
+    pub space: Space,
+    /// How pixel differences become one number.
+    pub reduce: Reduce,
+    /// True where the sphere's middle weighed more than its silhouette.
+    pub mask: bool,
+    /// Weights of the four image pairs.
+    pub weights: FitnessWeights,
+}
+
+/// Cost of a remap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Totals {
+    /// Distinct target points compared with a source, summed over sources.
+    pub evaluations: usize,
+    /// Points of the target lattice.
+    pub lattice_points: usize,
+}
+
+/// The result for one source point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Values of the source axes.
+    pub source: Vec<f64>,
+    /// Values of the target axes.
+    pub target: Vec<f64>,
+    /// Eq. 3 between both, 0 for equal looks.
+    pub fitness: f64,
+    /// NRMSD per channel of the reference scene's environment picture, whole image.
+    pub nrmsd: [f64; 3],
+    /// The same with the radial mask.
+    pub nrmsd_masked: [f64; 3],
+    /// Distinct target points compared.
+    pub evaluations: usize,
+    /// Target parameters that sit on the edge of their range, so that a better match may lie beyond.
+    pub saturated: Vec<String>,
+}
+
+impl Probe {
+    pub(crate) fn new(plan: &Plan, entries: Vec<Entry>, lattice_points: usize) -> Self {
+        let evaluations = entries.iter().map(|e| e.evaluations).sum();
+        Self {
+            format: FORMAT.into(),
+            version: VERSION,
+            program: concat!("lookmatch ", env!("CARGO_PKG_VERSION")).into(),
+            from: plan.from.clone(),
+            to: plan.to.clone(),
+            source_axes: plan.source_axes.clone(),
+            target_axes: plan.target_axes.clone(),
+            strategy: plan.strategy,
+            search: plan.search.clone(),
+            preset: plan.preset,
+            seed: plan.seed,
+            metric: Metric {
+                name: "guarnera-2018-eq3".into(),
+                space: plan.metric.space,
+                reduce: plan.metric.reduce,
+                mask: plan.mask,
+                weights: plan.metric.weights,
+            },
+            scene: plan.scene.clone(),
+            size: plan.size,
+            totals: Totals { evaluations, lattice_points },
+            entries,
+        }
+    }
+
+    /// Reads a probe file and checks that it is whole.
+    ///
+    /// # Errors
+    /// A file that is missing, no probe, of a newer version, lacks a field, or contradicts itself.
+    pub fn read(path: &Path) -> Result<Self, RemapError> {
+        let wrong = |reason: String| RemapError::Probe { path: path.to_owned(), reason };
+        let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+        let json: serde_json::Value =
+            serde_json::from_str(&text).map_err(|e| wrong(format!("it is not JSON: {e}")))?;
+        if json.get("format").and_then(|f| f.as_str()) != Some(FORMAT) {
+            return Err(wrong(format!("the field 'format' is not \"{FORMAT}\"")));
+        }
+        match json.get("version").and_then(serde_json::Value::as_u64) {
+            Some(version) if (1..=u64::from(VERSION)).contains(&version) => {}
+            Some(version) => {
+                let known = format!("this program reads versions up to {VERSION}; update it");
+                return Err(wrong(format!("its format version is {version}, {known}")));
+            }
+            None => return Err(wrong("the field 'version' is missing or no number".into())),
+        }
+        let probe: Self = serde_path_to_error::deserialize(json).map_err(|e| wrong(e.to_string()))?;
+        probe.check().map_err(wrong)?;
+        Ok(probe)
+    }
+
+    /// Writes the file, whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<(), RemapError> {
+        let failed = |source| RemapError::Write { path: path.to_owned(), source };
+        let text = serde_json::to_string_pretty(self).map_err(|e| failed(e.into()))?;
+        write_atomically(path, |out| out.write_all(text.as_bytes())).map_err(failed)
+    }
+
+    /// The entry at indices of the source axes.
+    pub fn entry(&self, indices: &[usize]) -> &Entry {
+        let place = indices.iter().zip(&self.source_axes).fold(0, |sum, (i, axis)| sum * axis.len() + i);
+        &self.entries[place]
+    }
+
+    /// The source material of an entry.
+    pub fn source_material(&self, values: &[f64]) -> Result<Material, RemapError> {
+        plan::material(&self.from, &self.source_axes, values)
+    }
+
+    /// The target material for values of the target axes, beside a source material.
+    pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
+        let mut target = plan::material(&self.to, &self.target_axes, values)?;
+        plan::carry_over(source, &mut target, &self.target_axes)?;
+        Ok(target)
+    }
+
+    /// What must hold beyond the types: sizes agree, names exist, numbers are finite.
+    fn check(&self) -> Result<(), String> {
+        for (material, axes, side) in
+            [(&self.from, &self.source_axes, "source"), (&self.to, &self.target_axes, "target")]
+        {
+            if axes.is_empty() {
+                return Err(format!("the field '{side}_axes' is empty"));
+            }
+            for axis in axes {
+                material.model().resolve(&axis.name).map_err(|e| format!("{side}_axes: {e}"))?;
+            }
+        }
+        let expected: usize = self.source_axes.iter().map(Axis::len).product();
+        if self.entries.len() != expected {
+            return Err(format!(
+                "it has {} entries where its axes have {expected} points",
+                self.entries.len()
+            ));
+        }
+        for (place, entry) in self.entries.iter().enumerate() {
+            let finite = |v: &[f64], n: usize| v.len() == n && v.iter().all(|x| x.is_finite());
+            let sound = finite(&entry.source, self.source_axes.len())
+                && finite(&entry.target, self.target_axes.len())
+                && entry.fitness.is_finite();
+            if !sound {
+                return Err(format!("entry {place} lacks a value or holds one that is not finite"));
+            }
+            self.target_material(&self.from, &entry.target).map_err(|e| format!("entry {place}: {e}"))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,158 @@
+//! The reference scene under its two lights, materials as seen in it, and the distance between two of them.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lookmatch_imaging::{Fitness, Reduce, Space, lab_planes, squared_distance, weighted_squared_distance};
+use lookmatch_materials::Material;
+use lookmatch_rendering::{Illumination, Part, Renderer};
+use rayon::prelude::*;
+
+use crate::{Plan, RemapError};
+
+/// What the metric knows of a material: the specular images under both lights in CIELAB, on the subject's pixels only.
+/// Everywhere else two materials look the same, because nothing else in the scene changes.
+#[derive(Clone, Debug)]
+pub struct Appearance {
+    /// Planes L*, a*, b* of the specular image under the point light.
+    point: Vec<f32>,
+    /// The same under the environment.
+    environment: Vec<f32>,
+}
+
+impl Appearance {
+    /// Size in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        (self.point.len() + self.environment.len()) * size_of::<f32>()
+    }
+}
+
+/// The reference scene, prepared under both lights.
+pub struct Stage {
+    point: Renderer,
+    environment: Renderer,
+    metric: Fitness,
+    /// Mask weights on the subject's pixels.
+    weights: Option<Vec<f32>>,
+    /// Diffuse-only images in CIELAB by albedo: few, because the albedo is seldom searched.
+    diffuse: Mutex<HashMap<[u64; 3], Arc<Appearance>>>,
+}
+
+impl Stage {
+    /// Prepares the scene of a plan.
+    ///
+    /// # Errors
+    /// Where the scene cannot be rendered, or the metric is not one that this fast path evaluates (CIELAB, root mean
+    /// square).
+    pub fn prepare(plan: &Plan) -> Result<Self, RemapError> {
+        if plan.metric.space != Space::Lab || plan.metric.reduce != Reduce::Rms {
+            return Err(RemapError::Option("a remap compares in CIELAB by the root mean square".into()));
+        }
+        let prepare = |light| Renderer::prepare(&plan.scene, light, plan.size).map(Renderer::keep_transport);
+        let point = prepare(Illumination::Point)?;
+        let environment = prepare(Illumination::Environment)?;
+        let on_subject = |weights: &[f32]| point.subjects().iter().map(|i| weights[*i as usize]).collect();
+        let weights = plan.mask.then(|| on_subject(point.mask().weights()));
+        let diffuse = Mutex::new(HashMap::new());
+        Ok(Self { metric: plan.metric.clone(), weights, diffuse, point, environment })
+    }
+
+    /// Renders materials, in parallel, in their order.
+    pub fn appearances(&self, materials: &[Material]) -> Vec<Appearance> {
+        materials.par_iter().map(|m| self.appearance(m)).collect()
+    }
+
+    /// Renders one material.
+    pub fn appearance(&self, material: &Material) -> Appearance {
+        let bsdf = material.bsdf();
+        let lab = |renderer: &Renderer| planes(&renderer.specular_pixels(&*bsdf));
+        Appearance { point: lab(&self.point), environment: lab(&self.environment) }
+    }
+
+    /// Eq. 3 of Guarnera *et al.* (2018) between two materials whose specular appearances are given.
+    pub fn fitness(
+        &self,
+        (a, seen_a): (&Material, &Appearance),
+        (b, seen_b): (&Material, &Appearance),
+    ) -> f64 {
+        let w = &self.metric.weights;
+        let specular = w.specular
+            * (w.specular_point * self.rms(&seen_a.point, &seen_b.point)
+                + w.specular_environment * self.rms(&seen_a.environment, &seen_b.environment));
+        let (albedo_a, albedo_b) = (a.bsdf().diffuse(), b.bsdf().diffuse());
+        if albedo_a == albedo_b {
+            return specular;
+        }
+        let (a, b) = (self.diffuse_appearance(a, albedo_a), self.diffuse_appearance(b, albedo_b));
+        let diffuse = w.diffuse_point * self.rms(&a.point, &b.point)
+            + w.diffuse_environment * self.rms(&a.environment, &b.environment);
+        specular + w.diffuse * diffuse
+    }
+
+    /// NRMSD per channel of the full pictures under the environment, whole image: without and with the mask.
+    pub fn nrmsd(&self, source: &Material, target: &Material) -> Result<[[f64; 3]; 2], RemapError> {
+        let (a, b) =
+            (self.environment.render(source, Part::Full), self.environment.render(target, Part::Full));
+        let plain = lookmatch_imaging::nrmsd(&a, &b, None)?;
+        Ok([plain, lookmatch_imaging::nrmsd(&a, &b, Some(self.environment.mask()))?])
+    }
+
+    fn diffuse_appearance(&self, material: &Material, albedo: [f64; 3]) -> Arc<Appearance> {
+        let key = albedo.map(f64::to_bits);
+        // A panic elsewhere leaves nothing half-written in this map.
+        let mut cache = self.diffuse.lock().unwrap_or_else(PoisonError::into_inner);
+        let lab = |renderer: &Renderer| {
+            let image = renderer.render(material, Part::DiffuseOnly);
+            let pixels: Vec<_> = renderer.subjects().iter().map(|i| image.pixels()[*i as usize]).collect();
+            planes(&pixels)
+        };
+        let render = || Appearance { point: lab(&self.point), environment: lab(&self.environment) };
+        cache.entry(key).or_insert_with(|| Arc::new(render())).clone()
+    }
+
+    /// Root mean square of ΔE76 over the whole image; pixels beside the subject add nothing.
+    fn rms(&self, a: &[f32], b: &[f32]) -> f64 {
+        let sum = match &self.weights {
+            Some(weights) => weighted_squared_distance(a, b, weights),
+            None => squared_distance(a, b),
+        };
+        (sum / (self.point.size() * self.point.size()) as f64).sqrt()
+    }
+}
+
+fn planes(pixels: &[[f32; 3]]) -> Vec<f32> {
+    let mut planes = vec![0.0; 3 * pixels.len()];
+    lab_planes(pixels, &mut planes);
+    planes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Options;
+    use lookmatch_imaging::ProbeImages;
+    use lookmatch_materials::by_name;
+
+    /// The stage's fast path against the metric as it is written, on whole images.
+    #[test]
+    fn fitness_is_equation_three() {
+        for mask in [false, true] {
+            let options = Options { mask, quick: true, ..Options::default() };
+            let mut plan = Plan::new(by_name("ward").unwrap(), by_name("ggx").unwrap(), &options).unwrap();
+            plan.size = 48;
+            let stage = Stage::prepare(&plan).unwrap();
+            let images = |m: &Material| ProbeImages {
+                diffuse_point: stage.point.render(m, Part::DiffuseOnly),
+                diffuse_environment: stage.environment.render(m, Part::DiffuseOnly),
+                full_point: stage.point.render(m, Part::Full),
+                full_environment: stage.environment.render(m, Part::Full),
+            };
+            let a = Material::parse("ward:diffuse=0.4,specular=0.2,roughness=0.1").unwrap();
+            let b = Material::parse("ggx:diffuse=0.5/0.4/0.3,ior=1.8,roughness=0.15").unwrap();
+            let fast = stage.fitness((&a, &stage.appearance(&a)), (&b, &stage.appearance(&b)));
+            let mask = mask.then(|| stage.point.mask());
+            let exact = plan.metric.evaluate(&images(&a), &images(&b), mask).unwrap();
+            assert!((fast - exact).abs() < 1e-3 * exact, "{fast} {exact}");
+        }
+    }
+}

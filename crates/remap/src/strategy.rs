@@ -1,0 +1,252 @@
+//! The remap itself: a search for each source point, alone or led by its neighbours.
+
+use std::path::Path;
+
+use lookmatch_materials::Role;
+use lookmatch_search::{
+    Bounds, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError, by_name,
+};
+
+use crate::gallery::{Gallery, Match, Stopped};
+use crate::journal::Journal;
+use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
+
+/// What happens during a remap, for progress displays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// Some source points were finished by an earlier run.
+    Resumed {
+        /// How many.
+        done: usize,
+    },
+    /// A source point is finished.
+    Point {
+        /// Finished points.
+        done: usize,
+        /// All points.
+        total: usize,
+        /// Targets rendered so far by this run.
+        renders: usize,
+    },
+}
+
+/// Finds the target of every source point of a plan.
+///
+/// `state` is a file that keeps finished points while the work goes on (see [`crate::journal_path`]) and is removed at
+/// its end; `stop` is asked often and ends the work early.
+///
+/// # Errors
+/// [`RemapError::Interrupted`] where `stop` said so; the failures of the search and of the state file.
+pub fn remap(
+    plan: &Plan,
+    stage: &Stage,
+    state: Option<&Path>,
+    observe: &mut dyn FnMut(Event),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Probe, RemapError> {
+    let lattice = Lattice { axes: plan.target_axes.clone() };
+    let sources = Lattice { axes: plan.source_axes.clone() };
+    let total = sources.len();
+    let mut found: Vec<Option<(Point, Entry)>> = vec![None; total];
+    let mut journal = match state {
+        Some(path) => Some(Journal::open(path, plan, |place, point, entry| {
+            if let Some(slot) = found.get_mut(place) {
+                *slot = Some((point, entry));
+            }
+        })?),
+        None => None,
+    };
+    let resumed = found.iter().flatten().count();
+    if resumed > 0 {
+        observe(Event::Resumed { done: resumed });
+    }
+    let pairing = Pairing::new(plan)?;
+    let mut gallery = Gallery::new(plan, stage, &lattice);
+    let mut done = resumed;
+    for (place, indices) in sources.points(&Bounds::full(&sources)).enumerate() {
+        if found[place].is_some() {
+            continue;
+        }
+        let values = sources.values(&indices);
+        let problem = match plan.strategy {
+            Strategy::Unconstrained => pairing.alone(&lattice, plan.seed),
+            Strategy::Constrained => pairing.led(&lattice, plan.seed, &indices, &|p| {
+                found[place_of(&sources, p)].as_ref().map(|(point, _)| point)
+            }),
+        };
+        let outcome = match search_one(plan, &mut gallery, &values, &problem, stop) {
+            Err(RemapError::Search(SearchError::Objective(e))) if e.is::<Stopped>() => {
+                return Err(RemapError::Interrupted { done, total });
+            }
+            other => other?,
+        };
+        let entry = entry(plan, stage, &lattice, values, &outcome)?;
+        if let Some(journal) = &mut journal {
+            journal.append(place, &outcome.best, &entry)?;
+        }
+        found[place] = Some((outcome.best, entry));
+        done += 1;
+        observe(Event::Point { done, total, renders: gallery.renders });
+    }
+    if let Some(journal) = journal {
+        journal.remove();
+    }
+    Ok(Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len()))
+}
+
+/// Searches the target of one source point.
+fn search_one(
+    plan: &Plan,
+    gallery: &mut Gallery,
+    values: &[f64],
+    problem: &Problem,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Outcome, RemapError> {
+    let source = plan.source_material(values)?;
+    let appearance = gallery.appearance(&source);
+    let mut objective = Match { gallery, source: &source, appearance: &appearance, stop };
+    let method: Box<dyn Search> = match plan.search.as_str() {
+        // With neighbours to start from, a wide initial population only costs renders.
+        "genetic" if !problem.guesses.is_empty() => Box::new(Genetic::new(GeneticSettings::continued())),
+        name => by_name(name).map_err(RemapError::Search)?,
+    };
+    method.run(problem, &mut objective).map_err(RemapError::Search)
+}
+
+fn entry(
+    plan: &Plan,
+    stage: &Stage,
+    lattice: &Lattice,
+    source: Vec<f64>,
+    outcome: &Outcome,
+) -> Result<Entry, RemapError> {
+    let target = lattice.values(&outcome.best);
+    let material = plan.source_material(&source)?;
+    let [nrmsd, nrmsd_masked] = stage.nrmsd(&material, &plan.target_material(&material, &target)?)?;
+    let on_edge = |(axis, index): (&lookmatch_search::Axis, &u32)| {
+        // Of two levels one is always an edge: a switch is not saturated.
+        let edge = *index == 0 || *index as usize == axis.len() - 1;
+        (axis.len() > 2 && edge).then(|| axis.name.clone())
+    };
+    Ok(Entry {
+        source,
+        target,
+        fitness: outcome.fitness,
+        nrmsd,
+        nrmsd_masked,
+        evaluations: outcome.evaluations,
+        saturated: lattice.axes.iter().zip(&outcome.best).filter_map(on_edge).collect(),
+    })
+}
+
+/// The place of indices in lexicographic order.
+fn place_of(sources: &Lattice, indices: &[u32]) -> usize {
+    indices.iter().zip(&sources.axes).fold(0, |sum, (i, axis)| sum * axis.len() + *i as usize)
+}
+
+/// Which target axes grow with which source axes, by the roles of their parameters.
+struct Pairing {
+    /// For each source axis, the target axes that correspond to it.
+    targets: Vec<Vec<usize>>,
+    /// For each source axis, target axes that switch the lobe on or off.
+    switches: Vec<Vec<usize>>,
+    /// Levels of the source's axes.
+    levels: Vec<Vec<f64>>,
+}
+
+impl Pairing {
+    fn new(plan: &Plan) -> Result<Self, RemapError> {
+        let roles = |material: &lookmatch_materials::Material, axes: &[lookmatch_search::Axis]| {
+            axes.iter()
+                .map(|a| material.model().parameter(&a.name).map(|p| p.role))
+                .collect::<Result<Vec<Role>, _>>()
+        };
+        let (from, to) = (roles(&plan.from, &plan.source_axes)?, roles(&plan.to, &plan.target_axes)?);
+        let is_switch =
+            |k: usize| to[k] == Role::SpecularReflectance && plan.target_axes[k].levels == [0.0, 1.0];
+        let axes = |role: Role, wanted: &dyn Fn(usize) -> bool| -> Vec<usize> {
+            (0..to.len()).filter(|k| role.corresponds_to(to[*k]) && wanted(*k)).collect()
+        };
+        Ok(Self {
+            targets: from.iter().map(|role| axes(*role, &|k| !is_switch(k))).collect(),
+            switches: from.iter().map(|role| axes(*role, &is_switch)).collect(),
+            levels: plan.source_axes.iter().map(|a| a.levels.clone()).collect(),
+        })
+    }
+
+    /// A source point on its own.
+    fn alone<'a>(&self, lattice: &'a Lattice, seed: u64) -> Problem<'a> {
+        Problem { lattice, bounds: Bounds::full(lattice), guesses: Vec::new(), seed }
+    }
+
+    /// A source point led by its neighbours with one smaller source parameter: corresponding target parameters may not
+    /// be smaller than theirs, and the search starts where they ended (Guarnera *et al.* 2018, 3.4).
+    fn led<'a, 'f>(
+        &self,
+        lattice: &'a Lattice,
+        seed: u64,
+        indices: &[u32],
+        result: &dyn Fn(&[u32]) -> Option<&'f Point>,
+    ) -> Problem<'a> {
+        let mut problem = self.alone(lattice, seed);
+        let mut neighbours = Vec::new();
+        for axis in 0..indices.len() {
+            // "Setting the specular reflectance respectively to null or any non-null positive value" (5.2).
+            if self.levels[axis][indices[axis] as usize] > 0.0 {
+                self.switches[axis].iter().for_each(|k| problem.bounds.low[*k] = 1);
+            }
+            let mut smaller = indices.to_vec();
+            if indices[axis] == 0 {
+                continue;
+            }
+            smaller[axis] -= 1;
+            if let Some(neighbour) = result(&smaller) {
+                for k in &self.targets[axis] {
+                    problem.bounds.low[*k] = problem.bounds.low[*k].max(neighbour[*k]);
+                }
+                neighbours.push((axis, neighbour));
+            }
+        }
+        problem.guesses = guesses(&problem.bounds, indices, &neighbours, result);
+        problem
+    }
+}
+
+/// Starting points: the neighbours, each carried on along its axis by its last step, and all carried on at once.
+fn guesses<'f>(
+    bounds: &Bounds,
+    indices: &[u32],
+    neighbours: &[(usize, &Point)],
+    result: &dyn Fn(&[u32]) -> Option<&'f Point>,
+) -> Vec<Point> {
+    let mut guesses: Vec<Point> = Vec::new();
+    let mut add = |point: Point| {
+        let point = bounds.clamp(&point);
+        if !guesses.contains(&point) {
+            guesses.push(point);
+        }
+    };
+    // On a plane through the three neighbours a, b and their common neighbour c the next point is a + b − c.
+    if let [(first, a), (second, b)] = neighbours {
+        let mut common = indices.to_vec();
+        common[*first] -= 1;
+        common[*second] -= 1;
+        if let Some(c) = result(&common) {
+            add(combine(a, b, c));
+        }
+    }
+    for (axis, neighbour) in neighbours.iter().rev() {
+        let mut before = indices.to_vec();
+        before[*axis] = before[*axis].saturating_sub(2);
+        if let Some(previous) = result(&before).filter(|_| indices[*axis] >= 2) {
+            add(combine(neighbour, neighbour, previous));
+        }
+        add((*neighbour).clone());
+    }
+    guesses
+}
+
+/// `a + b − c`, no index below 0.
+fn combine(a: &Point, b: &Point, c: &Point) -> Point {
+    a.iter().zip(b).zip(c).map(|((a, b), c)| (a + b).saturating_sub(*c)).collect()
+}

@@ -1,0 +1,182 @@
+//! How good a probe is where no search has looked: another scene, other light, beside what people do without it.
+
+use lookmatch_imaging::{Image, nrmsd};
+use lookmatch_materials::Material;
+use lookmatch_rendering::{EnvironmentLight, Illumination, Part, Renderer, Scene};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::{Baseline, Probe, RemapError, apply};
+
+/// Environment maps to validate under; `None` is the scene's own.
+pub type Lighting = Option<String>;
+
+/// Minimum, maximum, mean and standard deviation of one number over the source points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Standard deviation of the sample (n − 1); 0 for one point.
+    pub sd: f64,
+}
+
+impl Statistics {
+    /// Of at least one value.
+    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
+        let n = values.clone().count() as f64;
+        let mean = values.clone().sum::<f64>() / n;
+        let variance = values.clone().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+        let (min, max) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        Self { min, max, mean, sd: variance.sqrt() }
+    }
+}
+
+/// NRMSD per channel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Scores {
+    /// Whole image, as in the paper's Tables 2 and 4.
+    pub whole: [Statistics; 3],
+    /// With the radial mask on each sphere.
+    pub masked: [Statistics; 3],
+}
+
+/// One way to get a target material, judged.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MethodScores {
+    /// `probe`, `copy` or `copy, no Fresnel`.
+    pub method: String,
+    /// Its scores.
+    #[serde(flatten)]
+    pub scores: Scores,
+}
+
+/// The verdict on a probe under one environment.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ValidationReport {
+    /// Name of the scene.
+    pub scene: String,
+    /// Its environment map.
+    pub environment: String,
+    /// Side of the pictures in pixels.
+    pub size: usize,
+    /// Source points that were rendered.
+    pub points: usize,
+    /// The probe first, then the baselines that apply.
+    pub methods: Vec<MethodScores>,
+    /// True where the probe has the lowest mean masked NRMSD, averaged over channels.
+    pub probe_is_best: bool,
+}
+
+/// Source points to validate at: all of them, or `count` evenly spread ones.
+pub fn validation_points(probe: &Probe, count: Option<usize>) -> Vec<usize> {
+    let total = probe.entries.len();
+    let count = count.unwrap_or(total).clamp(1, total);
+    if count == total {
+        return (0..total).collect();
+    }
+    // Steps of the golden ratio along the table spread evenly over both axes, where equal steps would fall on
+    // few columns.
+    let step = |k: usize| ((k as f64 + 0.5) * 0.618_033_988_749_895).fract();
+    let mut points: Vec<usize> = (0..).map(|k| (step(k) * total as f64) as usize).fold_distinct(count);
+    points.sort_unstable();
+    points
+}
+
+/// The first `count` different numbers of an endless sequence.
+trait FoldDistinct: Iterator<Item = usize> + Sized {
+    fn fold_distinct(self, count: usize) -> Vec<usize> {
+        let mut found = Vec::with_capacity(count);
+        for value in self {
+            if !found.contains(&value) {
+                found.push(value);
+            }
+            if found.len() == count {
+                break;
+            }
+        }
+        found
+    }
+}
+
+impl<I: Iterator<Item = usize>> FoldDistinct for I {}
+
+/// Renders source and target at some of a probe's entries in the three-sphere scene and scores them, beside the baselines.
+///
+/// `observe` is told of each finished point.
+///
+/// # Errors
+/// Where the environment map cannot be read or a material cannot be made.
+pub fn validate(
+    probe: &Probe,
+    lighting: &Lighting,
+    points: &[usize],
+    size: usize,
+    observe: &(dyn Fn() + Sync),
+) -> Result<ValidationReport, RemapError> {
+    let scene = scene(probe, lighting);
+    let renderer = Renderer::prepare(&scene, Illumination::All, size)?.keep_transport();
+    let rows = points
+        .par_iter()
+        .map(|place| {
+            let row = score_point(probe, &renderer, *place);
+            observe();
+            row
+        })
+        .collect::<Result<Vec<_>, RemapError>>()?;
+    let names = std::iter::once("probe").chain(Baseline::ALL.map(Baseline::title));
+    let methods: Vec<MethodScores> = names
+        .enumerate()
+        .filter_map(|(k, name)| {
+            let scores: Option<Vec<_>> = rows.iter().map(|row| row[k]).collect();
+            Some(MethodScores { method: name.into(), scores: summarise(&scores?) })
+        })
+        .collect();
+    let mean = |m: &MethodScores| m.scores.masked.iter().map(|s| s.mean).sum::<f64>();
+    let probe_is_best = methods[1..].iter().all(|m| mean(&methods[0]) < mean(m));
+    let environment = scene.environment.map(|e| e.map).unwrap_or_default();
+    Ok(ValidationReport {
+        scene: scene.name,
+        environment,
+        size,
+        points: points.len(),
+        methods,
+        probe_is_best,
+    })
+}
+
+/// The three-sphere scene as both models of a probe can wear it.
+fn scene(probe: &Probe, lighting: &Lighting) -> Scene {
+    let mut scene = Scene::spheres().for_model(probe.from.model()).for_model(probe.to.model());
+    if let Some(map) = lighting {
+        scene.environment = Some(EnvironmentLight::of(map));
+    }
+    scene
+}
+
+/// NRMSD whole and masked.
+type Score = [[f64; 3]; 2];
+
+/// Scores of the probe and of each baseline that applies.
+fn score_point(probe: &Probe, renderer: &Renderer, place: usize) -> Result<Vec<Option<Score>>, RemapError> {
+    let source = probe.source_material(&probe.entries[place].source)?;
+    let reference = renderer.render(&source, Part::Full);
+    let score = |target: &Material| -> Result<Score, RemapError> {
+        let image: Image = renderer.render(target, Part::Full);
+        Ok([nrmsd(&reference, &image, None)?, nrmsd(&reference, &image, Some(renderer.mask()))?])
+    };
+    let mut scores = vec![Some(score(&apply(probe, &source, false)?.target)?)];
+    for rule in Baseline::ALL {
+        scores.push(rule.apply(&source, &probe.to)?.map(|target| score(&target)).transpose()?);
+    }
+    Ok(scores)
+}
+
+fn summarise(scores: &[Score]) -> Scores {
+    let channel =
+        |kind: usize| std::array::from_fn(|c| Statistics::of(scores.iter().map(move |score| score[kind][c])));
+    Scores { whole: channel(0), masked: channel(1) }
+}
