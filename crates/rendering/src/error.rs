@@ -9,7 +9,10 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum SceneError {
     /// The scene file cannot be read.
-    #[error("cannot read scene '{}': {source}", path.display())]
+    #[error(
+        "cannot read scene '{}': {source}; expected a scene file, or a built-in scene: reference, spheres",
+        path.display()
+    )]
     Read {
         /// The file.
         path: PathBuf,

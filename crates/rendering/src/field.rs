@@ -48,7 +48,7 @@ impl Field {
 
     /// The same scene with bodies that reflect what arrives in this field.
     fn lit(&self, scene: &Scene) -> Self {
-        let sharp = |place: &Place| self.from_points(place);
+        let sharp = |place: &Place| self.point_irradiance(place);
         let board = scene.plane.as_ref().map(|plane| {
             let place = |p| Place { position: p, normal: DVec3::Y, body: Body::Plane };
             Board::new(plane, |p| self.smooth_irradiance(&place(p)), |p| sharp(&place(p)))
@@ -70,7 +70,7 @@ impl Field {
     }
 
     /// Irradiance from the point lights alone.
-    pub(crate) fn from_points(&self, place: &Place) -> Rgb {
+    pub(crate) fn point_irradiance(&self, place: &Place) -> Rgb {
         self.points.iter().map(|light| from_point(&self.bodies, *light, place)).sum()
     }
 
@@ -83,22 +83,32 @@ impl Field {
 
     /// Radiance that arrives at a place from a unit direction, averaged over about `angle` radians. Point lights have
     /// no extent and are never met; the environment's lamps are left to [`Field::lamps`].
+    // Inlined: a direction just computed and handed over in memory stalls the ring transport (a quarter of its time).
+    #[inline(always)]
     pub(crate) fn incident(&self, place: &Place, direction: DVec3, angle: f64) -> Rgb {
         self.body_radiance(place, direction, angle).unwrap_or_else(|| {
             self.environment.as_ref().map_or(Rgb::ZERO, |e| e.dimmed_radiance(direction, angle))
         })
     }
 
-    /// The environment's lamps that are seen from a place: direction and irradiance on a surface that faces them.
+    /// The environment's lamps: direction and irradiance on a surface that faces them.
+    pub(crate) fn all_lamps(&self) -> &[(DVec3, Rgb)] {
+        self.environment.as_ref().map_or(&[], |e| &e.lamps)
+    }
+
+    /// The lamps that are seen from a place.
     pub(crate) fn lamps(&self, place: Place) -> impl Iterator<Item = (DVec3, Rgb)> {
-        let lamps = self.environment.as_ref().map_or(&[][..], |e| &e.lamps);
-        lamps.iter().copied().filter(move |(direction, _)| {
-            direction.dot(place.normal) > 0.0
-                && self.bodies.first(place.position, *direction, Some(place.body)).is_none()
-        })
+        self.all_lamps().iter().copied().filter(move |(direction, _)| self.sees(&place, *direction))
+    }
+
+    /// True where no body hides a direction from a place.
+    pub(crate) fn sees(&self, place: &Place, direction: DVec3) -> bool {
+        direction.dot(place.normal) > 0.0
+            && self.bodies.first(place.position, direction, Some(place.body)).is_none()
     }
 
     /// Radiance of the body that is met in a direction; `None` where there is none.
+    #[inline(always)]
     pub(crate) fn body_radiance(&self, place: &Place, direction: DVec3, angle: f64) -> Option<Rgb> {
         let (distance, body) = self.bodies.first(place.position, direction, Some(place.body))?;
         let point = place.position + direction * distance;
@@ -121,7 +131,7 @@ impl Field {
             (Some((distance, Body::Plane)), Some(board)) => {
                 let place =
                     Place { position: eye + direction * distance, normal: DVec3::Y, body: Body::Plane };
-                board.exact(place.position, self.from_points(&place))
+                board.exact(place.position, self.point_irradiance(&place))
             }
             _ => self.environment.as_ref().map_or(Rgb::ZERO, |e| e.radiance(direction, angle)),
         }

@@ -57,9 +57,11 @@ impl Film {
     /// Directions through the first `count` sub-pixel positions of a pixel (row by row from the top left).
     pub(crate) fn directions(&self, pixel: usize, count: u32) -> impl Iterator<Item = DVec3> {
         let (x, y) = ((pixel % self.size) as f64, (pixel / self.size) as f64);
+        // The sequence starts at the lower edge of each of its cells; from their middles the mean is the pixel's middle.
+        let middle = 0.5 / f64::from(count);
         (0..count).map(move |i| {
             let [dx, dy] = zero_two(i);
-            self.direction(x + dx, y + dy)
+            self.direction(x + dx + middle, y + dy + middle)
         })
     }
 

@@ -3,14 +3,16 @@
 //! Directions are drawn from the lobe, so two materials of different shape see different directions; the random
 //! numbers behind them belong to the pixel. Each look-up is averaged over the solid angle that its sample stands for.
 
+use glam::DVec3;
 use lookmatch_materials::{Bsdf, Geometry};
 
 use crate::Rgb;
 use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES, SurfacePoint, to_local, to_world};
+use crate::highlights::is_near_lamp;
 use crate::sampling::zero_two;
 
-/// Lobe samples of a pixel.
+/// Lobe samples of a pixel: a power of two, and a multiple of the sub-pixel samples.
 pub(crate) const SAMPLES: u32 = 1024;
 
 /// Radiance of a pixel through the specular lobe: the mean over its sub-pixel samples, those that miss being 0.
@@ -21,7 +23,9 @@ pub(crate) fn radiance(field: &Field, film: &Film, pixel: usize, bsdf: &dyn Bsdf
     let shift = zero_two(pixel as u32);
     let mut sum = Rgb::ZERO;
     for i in 0..samples {
-        let k = (i % SUBSAMPLES) as usize;
+        // Consecutive samples share a sub-pixel point: each block is stratified over the lobe by itself. Dealt out in turn,
+        // every point would see its own sixteenth of the lobe alone, because the sequence visits sixteenths in turn too.
+        let k = (i / (samples / SUBSAMPLES)) as usize;
         if k >= points.len() {
             // A share of the samples belongs to the sub-pixel positions that miss the subject.
             continue;
@@ -43,12 +47,13 @@ pub(crate) fn radiance(field: &Field, film: &Film, pixel: usize, bsdf: &dyn Bsdf
     sum / samples as f32 + lamps(field, &points, bsdf)
 }
 
-/// What the environment's lamps add: evaluated directly, as point lights are.
+/// What the environment's lamps add away from their highlights: evaluated directly, as point lights are.
 fn lamps(field: &Field, points: &[SurfacePoint], bsdf: &dyn Bsdf) -> Rgb {
     let mut sum = Rgb::ZERO;
     for point in points {
         let frame = point.frame();
-        for (direction, irradiance) in field.lamps(point.place) {
+        let far = |(direction, _): &(DVec3, Rgb)| !is_near_lamp(point, *direction);
+        for (direction, irradiance) in field.lamps(point.place).filter(far) {
             let (wi, wo) = (to_local(&frame, direction), to_local(&frame, point.wo));
             if let Some(g) = Geometry::new(wi, wo) {
                 let [r, g, b] = bsdf.specular(&g).map(|f| (f * wi[2]) as f32);

@@ -1,5 +1,7 @@
-//! What the point lights make of a lobe directly: evaluated, not integrated, because a point has no extent.
+//! What the lights without extent make of a lobe directly: point lights, and the environment's lamps close to where they
+//! are mirrored. Evaluated, not integrated: there the basis of the rings would ring.
 
+use glam::DVec3;
 use lookmatch_materials::{Bsdf, Geometry};
 use rayon::prelude::*;
 
@@ -8,14 +10,19 @@ use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES, SurfacePoint, to_local};
 use crate::irradiance::from_point;
 
-/// Sub-pixel samples away from every highlight and silhouette, where a lobe hardly changes within a pixel.
-const SMOOTH_SUBSAMPLES: u32 = 4;
 /// Sub-pixel samples where the half vector comes close to the normal: a lobe of α = 0.01 is no wider than a pixel.
 const FINE_SUBSAMPLES: u32 = 64;
-/// `tan²θ_h` below which a pixel is near a highlight (17 degrees).
-const NEAR: f64 = 0.1;
+/// `tan θ_h` in units of the pixel's width (as an angle of the normal) below which every sample is evaluated by itself, …
+const SHARP: f64 = 4.0;
+/// … and below which those of each quarter of the pixel are. Further out a lobe is all but linear within a pixel: even a
+/// tail that falls with the fourth power of θ_h changes its mean by 0.3 % at most.
+const CURVED: f64 = 16.0;
+/// `tan²θ_h` below which a lamp is a highlight (6 degrees) and above which it is left to the rings.
+const NEAR_LAMP: f64 = 0.01;
+/// Shortest mean of the unit directions that are merged into one.
+const STRAIGHT: f64 = 0.99;
 
-/// One lit sub-pixel sample: where it is on the lobe, and its irradiance over the number of samples of its pixel.
+/// A direction to evaluate a lobe in, and its irradiance over the number of samples of its pixel.
 type Sample = (Geometry<f32>, Rgb);
 
 /// Lit samples of every subject pixel.
@@ -35,6 +42,7 @@ impl Highlights {
             *sum += samples.len() as u32;
             Some(*sum)
         }));
+
         Self { starts, samples: per_pixel.into_iter().flatten().collect() }
     }
 
@@ -49,39 +57,142 @@ impl Highlights {
     }
 }
 
+/// True where a lamp in a unit direction is evaluated here, and not by the rings.
+pub(crate) fn is_near_lamp(point: &SurfacePoint, direction: DVec3) -> bool {
+    tan2_h(point, direction) < NEAR_LAMP
+}
+
+/// `tan²θ_h` of the half vector between a unit direction and the view.
+fn tan2_h(point: &SurfacePoint, direction: DVec3) -> f64 {
+    let h = direction + point.wo;
+    let along = h.dot(point.place.normal);
+    if along > 0.0 { h.length_squared() / (along * along) - 1.0 } else { f64::INFINITY }
+}
+
 fn pixel_samples(field: &Field, film: &Film, pixel: usize) -> Vec<Sample> {
-    if field.points.is_empty() {
-        return Vec::new();
-    }
-    let coarse = film.subject_points(&field.bodies, pixel, SMOOTH_SUBSAMPLES);
-    let is_near = |point: &SurfacePoint| {
-        field
-            .points
-            .iter()
-            .any(|(light, _)| geometry(point, *light).is_some_and(|g| g.tan2_h[0] + g.tan2_h[1] < NEAR))
-    };
-    let count = if coarse.iter().any(is_near) {
-        FINE_SUBSAMPLES
-    } else if coarse.len() < SMOOTH_SUBSAMPLES as usize {
-        SUBSAMPLES
-    } else {
-        SMOOTH_SUBSAMPLES
-    };
+    let points = film.subject_points(&field.bodies, pixel, SUBSAMPLES);
+    let width = width(&points);
     let mut samples = Vec::new();
-    for point in film.subject_points(&field.bodies, pixel, count) {
-        for light in &field.points {
-            let irradiance = from_point(&field.bodies, *light, &point.place);
-            if let Some(g) = geometry(&point, light.0).filter(|_| irradiance != Rgb::ZERO) {
-                samples.push((g.to_f32(), irradiance / count as f32));
-            }
+    for light in &field.points {
+        let sees = |points: &[SurfacePoint]| -> Vec<Lit> {
+            let lit = |p: &SurfacePoint| {
+                Lit::new(
+                    p,
+                    (light.0 - p.place.position).normalize(),
+                    from_point(&field.bodies, *light, &p.place),
+                )
+            };
+            points.iter().map(lit).collect()
+        };
+        let coarse = sees(&points);
+        if nearest(&coarse) < SHARP * width {
+            let fine = film.subject_points(&field.bodies, pixel, FINE_SUBSAMPLES);
+            samples.extend(sees(&fine).iter().filter_map(|l| l.sample(FINE_SUBSAMPLES)));
+        } else {
+            samples.extend(merged(&coarse, width));
         }
+    }
+    samples.extend(lamp_samples(field, &points, width));
+    samples
+}
+
+/// Samples of the lamps that are nearly mirrored in a pixel.
+fn lamp_samples(field: &Field, points: &[SurfacePoint], width: f64) -> Vec<Sample> {
+    let mut samples = Vec::new();
+    for (direction, irradiance) in field.all_lamps() {
+        if !points.iter().any(|p| is_near_lamp(p, *direction)) {
+            continue;
+        }
+        let lit = |p: &SurfacePoint| {
+            let seen = is_near_lamp(p, *direction) && field.sees(&p.place, *direction);
+            let cos = direction.dot(p.place.normal).max(0.0) as f32;
+            Lit::new(p, *direction, if seen { *irradiance * cos } else { Rgb::ZERO })
+        };
+        let lit: Vec<Lit> = points.iter().map(lit).collect();
+        samples.extend(merged(&lit, width));
     }
     samples
 }
 
-/// The reflection of a light at a point, in the sphere's own frame.
-fn geometry(point: &SurfacePoint, light: glam::DVec3) -> Option<Geometry<f64>> {
-    let frame = point.frame();
-    let wi = (light - point.place.position).normalize();
-    Geometry::new(to_local(&frame, wi), to_local(&frame, point.wo))
+/// A sub-pixel point with the light that one source gives it.
+struct Lit {
+    /// Directions towards light and view, in the sphere's own frame.
+    wi: DVec3,
+    wo: DVec3,
+    irradiance: Rgb,
+    tan_h: f64,
+}
+
+impl Lit {
+    fn new(point: &SurfacePoint, direction: DVec3, irradiance: Rgb) -> Self {
+        let frame = point.frame();
+        let local = |w| DVec3::from(to_local(&frame, w));
+        let tan_h = tan2_h(point, direction).max(0.0).sqrt();
+        Self { wi: local(direction), wo: local(point.wo), irradiance, tan_h }
+    }
+
+    /// The sample of a pixel with `count` of them; `None` in the dark.
+    fn sample(&self, count: u32) -> Option<Sample> {
+        let geometry = Geometry::new(self.wi.into(), self.wo.into())?;
+        (self.irradiance != Rgb::ZERO).then(|| (geometry.to_f32(), self.irradiance / count as f32))
+    }
+}
+
+fn nearest(lit: &[Lit]) -> f64 {
+    lit.iter().map(|l| l.tan_h).fold(f64::INFINITY, f64::min)
+}
+
+/// The samples of a pixel's [`SUBSAMPLES`] points, as few as the distance from the highlight allows. Along silhouettes,
+/// where points are missing and views differ, all are kept.
+fn merged(lit: &[Lit], width: f64) -> Vec<Sample> {
+    let distance = nearest(lit);
+    if lit.len() < SUBSAMPLES as usize || distance < SHARP * width {
+        return lit.iter().filter_map(|l| l.sample(SUBSAMPLES)).collect();
+    }
+    let parts = if distance < CURVED * width { 4 } else { 1 };
+    let part_of = |i: usize| quarter(i) % parts;
+    let part = |k| lit.iter().enumerate().filter(|(i, _)| part_of(*i) == k).map(|(_, l)| l).collect();
+    (0..parts).flat_map(|k| merge(part(k))).collect()
+}
+
+/// The quarter of the pixel in which sub-pixel position `i` lies: the leading binary digits of its coordinates.
+fn quarter(i: usize) -> usize {
+    (i & 1) + 2 * (i.count_ones() as usize & 1)
+}
+
+/// One sample in the mean direction of several; all of them where their directions differ, as about the poles of a
+/// sphere.
+fn merge(lit: Vec<&Lit>) -> Vec<Sample> {
+    let lit: Vec<&Lit> = lit.into_iter().filter(|l| l.irradiance != Rgb::ZERO).collect();
+    let n = lit.len().max(1) as f64;
+    let (wi, wo) = (lit.iter().map(|l| l.wi).sum::<DVec3>() / n, lit.iter().map(|l| l.wo).sum::<DVec3>() / n);
+    if wi.length().min(wo.length()) < STRAIGHT {
+        return lit.iter().filter_map(|l| l.sample(SUBSAMPLES)).collect();
+    }
+    let irradiance = lit.iter().map(|l| l.irradiance).sum();
+    let mean = Lit { wi: wi.normalize(), wo: wo.normalize(), irradiance, tan_h: 0.0 };
+    mean.sample(SUBSAMPLES).into_iter().collect()
+}
+
+/// Width of a pixel as an angle of the normal: the diagonal of the box of its points' normals.
+fn width(points: &[SurfacePoint]) -> f64 {
+    let normals = || points.iter().map(|p| p.place.normal);
+    let low = normals().fold(DVec3::INFINITY, DVec3::min);
+    let high = normals().fold(DVec3::NEG_INFINITY, DVec3::max);
+    if points.is_empty() { 0.0 } else { (high - low).length() / std::f64::consts::SQRT_2 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::zero_two;
+
+    #[test]
+    fn quarters_of_the_pixel() {
+        for i in 0..SUBSAMPLES {
+            let [x, y] = zero_two(i);
+            let expected = usize::from(x >= 0.5) + 2 * usize::from(y >= 0.5);
+            assert_eq!(quarter(i as usize), expected, "{i}");
+        }
+    }
 }

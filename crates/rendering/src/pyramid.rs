@@ -53,10 +53,11 @@ impl Pyramid {
 impl Level {
     fn bilinear(&self, u: f32, v: f32, wraps: bool) -> Rgb {
         let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
-        let (tx, ty) = (x - x0, y - y0);
+        // Rounding down: the positions are -0.5 or more, and truncation, unlike `floor`, is one instruction.
+        let down = |v: f32| (v + 1.0) as i32 - 1;
+        let (x0, y0) = (down(x), down(y));
+        let (tx, ty) = (x - x0 as f32, y - y0 as f32);
         let clamp = |i: i32, n: usize| i.clamp(0, n as i32 - 1) as usize;
-        let (x0, y0) = (x0 as i32, y0 as i32);
         let (left, right) = if wraps {
             let last = self.width as i32 - 1;
             // u lies in [0, 1], so that one step beyond either edge is all that occurs.

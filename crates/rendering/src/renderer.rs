@@ -17,6 +17,9 @@ use crate::scene::{Illumination, Scene};
 use crate::transport::{PixelLight, gather_all};
 use crate::{Rgb, SceneError, rgb};
 
+#[cfg(test)]
+mod accuracy;
+
 /// Which part of a material is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
@@ -68,6 +71,9 @@ impl Renderer {
         match illumination {
             Illumination::Point if scene.point_lights.is_empty() => return missing("point light"),
             Illumination::Environment if scene.environment.is_none() => return missing("environment"),
+            Illumination::All if scene.point_lights.is_empty() && scene.environment.is_none() => {
+                return missing("light");
+            }
             _ => {}
         }
         let field = Field::bake(scene, illumination)?;
@@ -203,7 +209,7 @@ fn diffuse_light(scene: &Scene, field: &Field, film: &Film, pixel: usize) -> Dif
         let Some(first) = here.first() else { continue };
         let normal = here.iter().map(|p| p.place.normal).sum::<glam::DVec3>().normalize();
         let mean = Place { position: field.bodies.point(sphere, normal), normal, body: first.place.body };
-        let sharp: Rgb = here.iter().map(|p| field.from_points(&p.place)).sum();
+        let sharp: Rgb = here.iter().map(|p| field.point_irradiance(&p.place)).sum();
         let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
         let radiance = irradiance / (SUBSAMPLES as f32 * PI);
         match description.diffuse {

@@ -157,11 +157,11 @@ impl Scene {
             |x: f64, z: f64, diffuse| Sphere { centre: [x, 0.0, z], radius: 1.0, diffuse: Some(diffuse) };
         Self {
             name: "spheres".into(),
-            camera: Camera { eye: [0.0, 2.6, 10.5], target: [0.0, -0.2, 0.0], up: up(), vertical_fov: 36.0 },
+            camera: Camera { eye: [0.0, 2.3, 9.0], target: [0.0, -0.1, 0.0], up: up(), vertical_fov: 40.0 },
             spheres: vec![
-                sphere(-2.15, 0.25, [0.50, 0.09, 0.06]),
-                sphere(0.0, -0.5, [0.10, 0.38, 0.12]),
-                sphere(2.15, 0.25, [0.08, 0.14, 0.45]),
+                sphere(-2.1, 0.0, [0.50, 0.09, 0.06]),
+                sphere(0.0, 0.0, [0.10, 0.38, 0.12]),
+                sphere(2.1, 0.0, [0.08, 0.14, 0.45]),
             ],
             plane: Some(checkerboard(8.0)),
             point_lights: vec![PointLight { position: [-4.0, 5.0, 5.0], intensity: [25.0; 3] }],
@@ -205,79 +205,114 @@ impl Scene {
 
     /// Checks every field; files are checked when they are read.
     pub fn check(&self) -> Result<(), SceneError> {
-        let wrong = |field: String, value: String, expected| {
+        self.faults().into_iter().find(|fault| !fault.passes).map_or(Ok(()), |fault| {
+            let Fault { field, value, expected, .. } = fault;
             Err(SceneError::Field { scene: self.name.clone(), field, value, expected })
-        };
-        let all_finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
-        let is_albedo = |v: &[f64; 3]| v.iter().all(|x| (0.0..=1.0).contains(x));
-        let c = &self.camera;
-        if !all_finite(&c.eye) || !all_finite(&c.target) || c.eye == c.target {
-            return wrong(
-                "camera.target".into(),
-                format!("{:?}", c.target),
-                "finite and not the camera's eye",
-            );
-        }
-        let (forward, up) = (glam::DVec3::from(c.target) - glam::DVec3::from(c.eye), glam::DVec3::from(c.up));
-        if !all_finite(&c.up) || forward.cross(up).length() <= 1e-9 * forward.length() {
-            return wrong("camera.up".into(), format!("{:?}", c.up), "a direction across the line of sight");
-        }
-        if !(c.vertical_fov > 0.0 && c.vertical_fov < 180.0) {
-            return wrong(
-                "camera.vertical_fov".into(),
-                c.vertical_fov.to_string(),
-                "degrees above 0 and below 180",
-            );
-        }
-        if self.spheres.is_empty() {
-            return wrong("sphere".into(), "missing".into(), "at least one [[sphere]]");
-        }
-        for (k, s) in self.spheres.iter().enumerate() {
-            if !(s.radius > 0.0 && s.radius.is_finite() && all_finite(&s.centre)) {
-                return wrong(format!("sphere[{k}].radius"), s.radius.to_string(), "metres above 0");
-            }
-            if s.diffuse.is_some_and(|d| !is_albedo(&d)) {
-                return wrong(
-                    format!("sphere[{k}].diffuse"),
-                    format!("{:?}", s.diffuse),
-                    "three numbers in [0, 1]",
-                );
-            }
-        }
-        if let Some(p) = &self.plane {
-            if !(p.half_extent > 0.0
-                && p.check_size > 0.0
-                && all_finite(&[p.height, p.half_extent, p.check_size]))
-            {
-                let sizes = format!("{} and {}", p.half_extent, p.check_size);
-                return wrong("plane.half_extent and plane.check_size".into(), sizes, "metres above 0");
-            }
-            if !is_albedo(&p.light) || !is_albedo(&p.dark) {
-                return wrong(
-                    "plane.light and plane.dark".into(),
-                    format!("{:?}", p.light),
-                    "numbers in [0, 1]",
-                );
-            }
-        }
-        for (k, l) in self.point_lights.iter().enumerate() {
-            if !all_finite(&l.position) || !l.intensity.iter().all(|i| *i >= 0.0 && i.is_finite()) {
-                return wrong(
-                    format!("point_light[{k}].intensity"),
-                    format!("{:?}", l.intensity),
-                    "W/sr, 0 or more",
-                );
-            }
-        }
-        match &self.environment {
-            Some(e) if !(e.scale > 0.0 && e.scale.is_finite()) => {
-                wrong("environment.scale".into(), e.scale.to_string(), "a factor above 0")
-            }
-            Some(e) if !e.rotation.is_finite() => {
-                wrong("environment.rotation".into(), e.rotation.to_string(), "degrees")
-            }
-            _ => Ok(()),
-        }
+        })
+    }
+
+    /// Everything that could be wrong with the fields, in their order.
+    fn faults(&self) -> Vec<Fault> {
+        let mut faults = self.camera.faults();
+        faults.push(Fault::new("sphere", "missing", !self.spheres.is_empty(), "at least one [[sphere]]"));
+        faults.extend(self.spheres.iter().enumerate().flat_map(|(k, s)| s.faults(k)));
+        faults.extend(self.plane.iter().flat_map(Plane::faults));
+        faults.extend(self.point_lights.iter().enumerate().flat_map(|(k, l)| l.faults(k)));
+        faults.extend(self.environment.iter().flat_map(EnvironmentLight::faults));
+        faults
+    }
+}
+
+/// A possible fault: a field, its value, whether that passes, and what would.
+struct Fault {
+    field: String,
+    value: String,
+    passes: bool,
+    expected: &'static str,
+}
+
+impl Fault {
+    fn new(field: impl Into<String>, value: impl ToString, passes: bool, expected: &'static str) -> Self {
+        Self { field: field.into(), value: value.to_string(), passes, expected }
+    }
+
+    fn point(field: impl Into<String>, v: [f64; 3]) -> Self {
+        Self::new(field, format!("{v:?}"), v.iter().all(|x| x.is_finite()), "three finite numbers")
+    }
+
+    fn length(field: impl Into<String>, v: f64) -> Self {
+        Self::new(field, v, v > 0.0 && v.is_finite(), "metres above 0")
+    }
+
+    fn albedo(field: impl Into<String>, v: [f64; 3]) -> Self {
+        let passes = v.iter().all(|x| (0.0..=1.0).contains(x));
+        Self::new(field, format!("{v:?}"), passes, "three numbers in [0, 1]")
+    }
+}
+
+impl Camera {
+    fn faults(&self) -> Vec<Fault> {
+        let forward = glam::DVec3::from(self.target) - glam::DVec3::from(self.eye);
+        let across = forward.cross(self.up.into()).length() > 1e-9 * forward.length();
+        let (target, up) = (format!("{:?}", self.target), format!("{:?}", self.up));
+        let has_angle = self.vertical_fov > 0.0 && self.vertical_fov < 180.0;
+        vec![
+            Fault::point("camera.eye", self.eye),
+            Fault::point("camera.target", self.target),
+            Fault::new(
+                "camera.target",
+                target,
+                self.eye != self.target,
+                "a point that is not the camera's eye",
+            ),
+            Fault::point("camera.up", self.up),
+            Fault::new("camera.up", up, across, "a direction across the line of sight"),
+            Fault::new("camera.vertical_fov", self.vertical_fov, has_angle, "degrees above 0 and below 180"),
+        ]
+    }
+}
+
+impl Sphere {
+    fn faults(&self, k: usize) -> Vec<Fault> {
+        let mut faults = vec![
+            Fault::point(format!("sphere[{k}].centre"), self.centre),
+            Fault::length(format!("sphere[{k}].radius"), self.radius),
+        ];
+        faults.extend(self.diffuse.map(|d| Fault::albedo(format!("sphere[{k}].diffuse"), d)));
+        faults
+    }
+}
+
+impl Plane {
+    fn faults(&self) -> Vec<Fault> {
+        vec![
+            Fault::new("plane.height", self.height, self.height.is_finite(), "metres"),
+            Fault::length("plane.half_extent", self.half_extent),
+            Fault::length("plane.check_size", self.check_size),
+            Fault::albedo("plane.light", self.light),
+            Fault::albedo("plane.dark", self.dark),
+        ]
+    }
+}
+
+impl PointLight {
+    fn faults(&self, k: usize) -> Vec<Fault> {
+        let passes = self.intensity.iter().all(|i| *i >= 0.0 && i.is_finite());
+        let intensity = format!("{:?}", self.intensity);
+        vec![
+            Fault::point(format!("point_light[{k}].position"), self.position),
+            Fault::new(format!("point_light[{k}].intensity"), intensity, passes, "W/sr, 0 or more"),
+        ]
+    }
+}
+
+impl EnvironmentLight {
+    fn faults(&self) -> Vec<Fault> {
+        let is_factor = self.scale > 0.0 && self.scale.is_finite();
+        vec![
+            Fault::new("environment.scale", self.scale, is_factor, "a factor above 0"),
+            Fault::new("environment.rotation", self.rotation, self.rotation.is_finite(), "degrees"),
+        ]
     }
 }
 

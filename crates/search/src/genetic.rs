@@ -138,8 +138,10 @@ impl Run<'_> {
         if self.settings.start == Start::Near && !points.is_empty() {
             let starts = points.len();
             for k in 0..missing {
-                let near = sampling::unseen_near(&points[k % starts], &self.memo, &points, self.bounds, &mut self.rng);
-                points.extend(near);
+                let start = points[k % starts].clone();
+                // In a corner of the bounds there may be nothing new near by: then the start stands in twice.
+                let near = sampling::unseen_near(&start, &self.memo, &points, self.bounds, &mut self.rng);
+                points.push(near.unwrap_or(start));
             }
             return points.iter().map(genes).collect();
         }

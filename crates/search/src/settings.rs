@@ -212,16 +212,16 @@ impl GeneticSettings {
     }
 
     /// For a search that goes on from a neighbour's result, given as a guess: a handful of individuals around the
-    /// guesses, then the descent. Costs a tenth of [`GeneticSettings::lookmatch`] and finds the basin that the
-    /// guesses lie in.
+    /// guesses, then one descent. It finds the bottom of the basin that the guesses lie in, for a small part of what
+    /// [`GeneticSettings::lookmatch`] costs.
     pub fn continued() -> GeneticSettings {
         GeneticSettings {
-            population_per_axis: 2,
-            population_min: 6,
+            population_per_axis: 1,
+            population_min: 5,
             start: Start::Near,
             stall_generations: 1,
             polish_starts: 1,
-            polish_radius: 2,
+            polish_radius: 1,
             ..GeneticSettings::lookmatch()
         }
     }

@@ -54,9 +54,10 @@ proptest! {
         };
         let guesses = vec![vec![59; sides.len()], vec![0; sides.len()]];
         let problem = Problem { lattice: &lattice, bounds: bounds.clone(), guesses, seed };
-        for entry in registry() {
+        let continued: Box<dyn Search> = Box::new(Genetic::new(GeneticSettings::continued()));
+        for search in registry().iter().map(|entry| (entry.make)()).chain([continued]) {
             let mut recorder = Recorder { fitness: bowl(&centre), asked: vec![] };
-            let outcome = (entry.make)().run(&problem, &mut recorder).expect("a sound problem");
+            let outcome = search.run(&problem, &mut recorder).expect("a sound problem");
             let distinct: HashSet<&Point> = recorder.asked.iter().collect();
             prop_assert!(recorder.asked.iter().all(|p| bounds.contains(p)));
             prop_assert_eq!(distinct.len(), recorder.asked.len());

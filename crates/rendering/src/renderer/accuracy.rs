@@ -1,0 +1,113 @@
+//! The ring transport against the direct integral: two ways to the same picture that share nothing but the light.
+
+use lookmatch_imaging::{delta_e76, lab_from_linear_srgb};
+
+use super::*;
+
+/// Side of the pictures. Large, because what differs is the light within a pixel; few of the pixels are evaluated.
+const SIZE: usize = 200;
+/// Share of the subject pixels that is evaluated.
+const STEP: usize = 61;
+/// Samples of the direct integral.
+const SAMPLES: u32 = 8192;
+
+/// Over the subject pixels: mean and maximum of ΔE*76, and the root of the mean squared difference over that of the mean
+/// squared value in percent.
+type Distance = [f64; 3];
+
+fn distance(renderer: &Renderer, material: &Material, a: &[[f32; 3]], b: &[[f32; 3]]) -> Distance {
+    let diffuse = renderer.diffuse_pixels(material);
+    let (mut sum, mut max, mut squares, mut power) = (0.0, 0.0f64, 0.0, 0.0);
+    for ((a, b), diffuse) in a.iter().zip(b).zip(&diffuse) {
+        let total = |s: &[f32; 3]| -> [f64; 3] { std::array::from_fn(|c| f64::from(s[c] + diffuse[c])) };
+        let (a, b) = (total(a), total(b));
+        let delta_e = delta_e76(lab_from_linear_srgb(a), lab_from_linear_srgb(b));
+        sum += delta_e;
+        max = max.max(delta_e);
+        squares += (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>();
+        power += b.iter().map(|b| b * b).sum::<f64>();
+    }
+    [sum / diffuse.len() as f64, max, 100.0 * (squares / power).sqrt()]
+}
+
+/// A renderer with a share of its subject pixels.
+fn thinned(scene: &Scene, illumination: Illumination) -> Renderer {
+    let renderer = Renderer::prepare(scene, illumination, SIZE).unwrap();
+    let Renderer { field, film, .. } = &renderer;
+    let subjects: Vec<u32> = renderer.subjects.iter().copied().step_by(STEP).collect();
+    let diffuse = subjects.iter().map(|p| diffuse_light(scene, field, film, *p as usize)).collect();
+    let highlights = Highlights::prepare(field, film, &subjects);
+    Renderer { subjects, diffuse, highlights, ..renderer }.keep_transport()
+}
+
+/// Prints and checks the distances of materials, each with the most that is accepted.
+fn check(scene: &Scene, illumination: Illumination, accepted: &[(&str, Distance)]) {
+    let renderer = thinned(scene, illumination);
+    for (text, most) in accepted {
+        let material = Material::parse(text).unwrap();
+        let bsdf = material.bsdf();
+        let (rings, direct) = (renderer.specular_pixels(&*bsdf), renderer.gathered_pixels(&*bsdf, SAMPLES));
+        let found = distance(&renderer, &material, &rings, &direct);
+        let [mean, max, rms] = found;
+        println!("{} {illumination:?} {text}: ΔE mean {mean:.3}, max {max:.2}, rms {rms:.3} %", scene.name);
+        assert!(found.iter().zip(most).all(|(f, m)| f <= m), "{text}: {found:?}, accepted {most:?}");
+    }
+}
+
+#[test]
+fn environment() {
+    let accepted = [
+        ("ggx:roughness=0.01", [0.08, 3.0, 0.5]),
+        ("ggx:roughness=0.05", [0.07, 1.5, 0.3]),
+        ("ggx:roughness=0.2", [0.08, 0.8, 0.25]),
+        ("ggx:roughness=0.5", [0.07, 0.4, 0.15]),
+        ("beckmann:roughness=0.1", [0.08, 2.5, 0.3]),
+        ("ward:roughness=0.1", [0.07, 0.7, 0.2]),
+        ("as:roughness=0.1", [0.45, 5.5, 0.8]),
+        ("ggx-conductor:roughness=0.02", [0.55, 6.0, 0.9]),
+        ("ggx-conductor:roughness=0.2", [0.5, 3.5, 0.9]),
+    ];
+    check(&Scene::reference(), Illumination::Environment, &accepted);
+}
+
+#[test]
+fn point_light() {
+    let accepted = [
+        ("ggx:roughness=0.01", [0.01, 0.3, 0.03]),
+        ("ggx:roughness=0.2", [0.01, 0.1, 0.05]),
+        ("ward:roughness=0.1", [0.01, 0.1, 0.03]),
+        ("ggx-conductor:roughness=0.1", [0.08, 0.6, 0.05]),
+    ];
+    check(&Scene::reference(), Illumination::Point, &accepted);
+}
+
+#[test]
+fn lamps() {
+    let accepted = [
+        ("ggx:roughness=0.05", [0.04, 1.0, 0.2]),
+        ("beckmann-conductor:roughness=0.02", [0.2, 3.0, 1.0]),
+        ("ggx-conductor:roughness=0.1", [0.22, 1.6, 0.4]),
+    ];
+    check(&Scene::spheres(), Illumination::Environment, &accepted);
+    // A narrow lobe must not ring about the lamps of the map: what it subtracts beside them is seen as black.
+    let renderer = Renderer::prepare(&Scene::spheres(), Illumination::Environment, 64).unwrap();
+    let bsdf = Material::parse("beckmann-conductor:roughness=0.02").unwrap().bsdf();
+    let least = renderer.specular_pixels(&*bsdf).into_iter().flatten().fold(0.0, f32::min);
+    assert!(least > -1e-3, "{least}");
+}
+
+#[test]
+fn shipped_samples_of_anisotropic_lobes_suffice() {
+    let renderer = thinned(&Scene::reference(), Illumination::Environment);
+    for (text, most) in [
+        ("ggx:roughness_u=0.05,roughness_v=0.3", [0.12, 1.1, 0.3]),
+        ("ward:roughness_u=0.3,roughness_v=0.1", [0.13, 1.0, 0.3]),
+    ] {
+        let material = Material::parse(text).unwrap();
+        let bsdf = material.bsdf();
+        let (few, many) = (renderer.specular_pixels(&*bsdf), renderer.gathered_pixels(&*bsdf, 2 * SAMPLES));
+        let found = distance(&renderer, &material, &few, &many);
+        println!("{text}: {found:.3?}");
+        assert!(found.iter().zip(most).all(|(f, m)| *f <= m), "{text}: {found:?}, accepted {most:?}");
+    }
+}
