@@ -88,27 +88,42 @@ struct Strip {
     source: Material,
     target: Material,
     columns: Vec<&'static str>,
+    /// The difference that the error maps draw brightest, as a distance in linear RGB.
+    scale: f32,
 }
 
-/// Renders source, probe, baselines and the probe's error map beside each other.
+/// Renders source, probe and baselines beside each other, and below each its difference from the source, all on one scale.
 fn strip(probe: &Probe, renderer: &Renderer, place: usize, path: &Path) -> anyhow::Result<Strip> {
     let source = probe.source_material(&probe.entries[place].source)?;
     let target = apply(probe, &source, false)?.target;
-    let mut columns = vec!["source", "probe"];
-    let mut images = vec![renderer.render(&source, Part::Full), renderer.render(&target, Part::Full)];
-    let (map, _) = error_map(&images[0], &images[1], None)?;
+    let reference = renderer.render(&source, Part::Full);
+    let mut columns = vec!["probe"];
+    let mut images = vec![renderer.render(&target, Part::Full)];
     for rule in Baseline::ALL {
         if let Some(material) = rule.apply(&source, &probe.to)? {
             columns.push(rule.title());
             images.push(renderer.render(&material, Part::Full));
         }
     }
-    columns.push("error of the probe");
-    images.push(map);
-    let all: Vec<&Image> = images.iter().collect();
-    write_image(path, &Image::beside(&all), &[])?;
+    let scales = images.iter().map(|image| Ok(error_map(&reference, image, None)?.1));
+    let scale = scales.collect::<anyhow::Result<Vec<f32>>>()?.into_iter().fold(0.0, f32::max);
+    let error = |image: &Image| -> anyhow::Result<Image> { Ok(error_map(&reference, image, Some(scale))?.0) };
+    let errors = images.iter().map(error).collect::<anyhow::Result<Vec<_>>>()?;
+    let none = Image::new(renderer.size(), renderer.size());
+    let row = |first: &Image, rest: &[Image]| {
+        Image::beside(&std::iter::once(first).chain(rest).collect::<Vec<_>>())
+    };
+    write_image(path, &above(&row(&reference, &images), &row(&none, &errors)), &[])?;
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Strip { file, source, target, columns })
+    columns.insert(0, "source");
+    Ok(Strip { file, source, target, columns, scale })
+}
+
+/// One picture above another of the same width.
+fn above(upper: &Image, lower: &Image) -> Image {
+    Image::from_fn(upper.width(), upper.height() + lower.height(), |x, y| {
+        if y < upper.height() { upper.get(x, y) } else { lower.get(x, y - upper.height()) }
+    })
 }
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1500px;margin:2rem auto;padding:0 1rem;\
@@ -144,11 +159,13 @@ fn page(probe: &Probe, validation: &ValidationReport, strips: &[Strip]) -> Marku
                 }
                 (scores(validation))
                 h2 { "Side by side" }
+                p { "Below each picture, its difference from the source, on one scale." }
                 @for strip in strips {
                     figure {
                         div.heads { @for column in &strip.columns { span { (column) } } }
                         img src=(strip.file) alt=(format!("{} beside {}", strip.source, strip.target));
-                        figcaption { code { (strip.source) } " becomes " code { (strip.target) } }
+                        figcaption { code { (strip.source) } " becomes " code { (strip.target) }
+                            "; brightest difference " (format!("{:.3}", strip.scale)) }
                     }
                 }
             }

@@ -41,7 +41,10 @@ fn run(search: &str, seed: u64, stage: &Stage) -> Probe {
 fn main() {
     let stage = Stage::prepare(&plan("exhaustive", 1)).expect("the reference scene");
     let truth = run("exhaustive", 1, &stage);
-    println!("{:<24}{:>6}{:>18}{:>18}{:>22}", "search", "seed", "optimum found", "lattice seen", "worst fitness ratio");
+    println!(
+        "{:<24}{:>6}{:>18}{:>18}{:>22}",
+        "search", "seed", "optimum found", "lattice seen", "worst fitness ratio"
+    );
     for method in METHODS {
         for seed in 1..=SEEDS {
             let probe = run(method, seed, &stage);

@@ -207,10 +207,11 @@ pub(crate) fn carry_over(
         searched.iter().map(|a| target.model().resolve(&a.name)).collect::<Result<Vec<_>, _>>()?.concat();
     for (index, parameter) in target.model().parameters.iter().enumerate() {
         let shared = [Role::DiffuseReflectance, Role::ConductorIndex, Role::Extinction];
-        if shared.contains(&parameter.role) && !taken.contains(&index) {
-            if let Some(value) = source.by_role(parameter.role) {
-                target.set_value(index, value)?;
-            }
+        if !shared.contains(&parameter.role) || taken.contains(&index) {
+            continue;
+        }
+        if let Some(value) = source.by_role(parameter.role) {
+            target.set_value(index, value)?;
         }
     }
     Ok(())

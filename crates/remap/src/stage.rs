@@ -54,7 +54,7 @@ impl Stage {
         let on_subject = |weights: &[f32]| point.subjects().iter().map(|i| weights[*i as usize]).collect();
         let weights = plan.mask.then(|| on_subject(point.mask().weights()));
         let diffuse = Mutex::new(HashMap::new());
-        Ok(Self { metric: plan.metric.clone(), weights, diffuse, point, environment })
+        Ok(Self { metric: plan.metric, weights, diffuse, point, environment })
     }
 
     /// Renders materials, in parallel, in their order.

@@ -45,13 +45,14 @@ impl AnglePosition {
 impl LobeTable {
     /// Expands the specular lobe of an isotropic BSDF.
     pub(crate) fn new(bsdf: &dyn Bsdf) -> Self {
-        let mut values = vec![[0.0; ROW]; 3 * ANGLES];
-        let mut products = vec![[0.0; ROW]; 3 * ANGLES];
-        for point in geometries() {
-            let f = bsdf.specular_f32(&point.geometry);
-            for (c, f) in f.into_iter().enumerate() {
+        let lobe: Vec<[f32; 3]> = geometries().iter().map(|p| bsdf.specular_f32(&p.geometry)).collect();
+        let grey = lobe.iter().all(|[r, g, b]| r == g && g == b);
+        let channels = if grey { 1 } else { 3 };
+        let mut products = vec![[0.0; ROW]; channels * ANGLES];
+        for (point, f) in geometries().iter().zip(&lobe) {
+            for c in 0..channels {
                 let products = &mut products[c * ANGLES + point.angle];
-                let g = f64::from(f) * point.weight;
+                let g = f64::from(f[c]) * point.weight;
                 for k in 0..TERMS {
                     let term = g * point.terms[k];
                     products[point.interval * TERMS + k] += (1.0 - point.hat) * term;
@@ -59,15 +60,8 @@ impl LobeTable {
                 }
             }
         }
-        for (value, product) in values.iter_mut().zip(&mut products) {
-            project(product);
-            *value = product.map(|p| p as f32);
-        }
-        let (red, rest) = values.split_at(ANGLES);
-        let grey = red == &rest[..ANGLES] && red == &rest[ANGLES..];
-        let channels = if grey { 1 } else { 3 };
-        values.truncate(channels * ANGLES);
-        Self { values, channels }
+        products.iter_mut().for_each(project);
+        Self { values: products.iter().map(|row| row.map(|p| p as f32)).collect(), channels }
     }
 
     /// The two tabulated rows around an angle of view for a channel, and where the angle lies between them.

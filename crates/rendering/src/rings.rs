@@ -11,6 +11,7 @@
 //! and the light is reduced, once, to its moments in the same functions.
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::LazyLock;
 
 /// Nodes of the hat functions.
 pub(crate) const NODES: usize = 24;
@@ -21,7 +22,9 @@ pub(crate) const ROW: usize = NODES * TERMS;
 
 /// Node `j` of the hat functions in radians: dense near 0, where narrow lobes are, and π/2 at the last.
 pub(crate) fn node(j: usize) -> f64 {
-    FRAC_PI_2 * (j as f64 / (NODES - 1) as f64).powf(2.5)
+    static ALL: LazyLock<[f64; NODES]> =
+        LazyLock::new(|| std::array::from_fn(|j| FRAC_PI_2 * (j as f64 / (NODES - 1) as f64).powf(2.5)));
+    ALL[j]
 }
 
 /// The interval between nodes that an angle lies in, and the share of its right-hand hat function.

@@ -34,7 +34,7 @@ fn axis_summary(probe: &Probe, k: usize, axis: &Axis) -> serde_json::Value {
     json!({
         "name": axis.name, "levels": axis.len(), "min": axis.value(0), "max": axis.value(axis.len() - 1),
         "found_min": found().fold(f64::INFINITY, f64::min), "found_max": found().fold(f64::NEG_INFINITY, f64::max),
-        "saturated": probe.entries.iter().filter(|e| e.saturated.iter().any(|n| *n == axis.name)).count(),
+        "saturated": probe.entries.iter().filter(|e| e.saturated.contains(&axis.name)).count(),
     })
 }
 
