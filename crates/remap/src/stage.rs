@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lookmatch_imaging::{Fitness, Reduce, Space, lab_planes, squared_distance, weighted_squared_distance};
-use lookmatch_materials::Material;
+use lookmatch_materials::{Bsdf, Material};
 use lookmatch_rendering::{Illumination, Part, Renderer};
 use rayon::prelude::*;
 
@@ -57,16 +57,20 @@ impl Stage {
         Ok(Self { metric: plan.metric, weights, diffuse, point, environment })
     }
 
-    /// Renders materials, in parallel, in their order.
+    /// Renders materials, on all cores, in their order.
     pub fn appearances(&self, materials: &[Material]) -> Vec<Appearance> {
-        materials.par_iter().map(|m| self.appearance(m)).collect()
+        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
+        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
+        let lab = |renderer: &Renderer| -> Vec<Vec<f32>> {
+            renderer.specular_batch(&bsdfs).par_iter().map(|pixels| planes(pixels)).collect()
+        };
+        let pairs = lab(&self.point).into_iter().zip(lab(&self.environment));
+        pairs.map(|(point, environment)| Appearance { point, environment }).collect()
     }
 
     /// Renders one material.
     pub fn appearance(&self, material: &Material) -> Appearance {
-        let bsdf = material.bsdf();
-        let lab = |renderer: &Renderer| planes(&renderer.specular_pixels(&*bsdf));
-        Appearance { point: lab(&self.point), environment: lab(&self.environment) }
+        self.appearances(std::slice::from_ref(material)).swap_remove(0)
     }
 
     /// Eq. 3 of Guarnera *et al.* (2018) between two materials whose specular appearances are given.

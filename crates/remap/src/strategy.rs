@@ -11,6 +11,9 @@ use crate::gallery::{Gallery, Match, Stopped};
 use crate::journal::Journal;
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
 
+/// Levels by which a result may differ from what its neighbours foresaw.
+const FORESEEN: u32 = 3;
+
 /// What happens during a remap, for progress displays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
@@ -105,12 +108,25 @@ fn search_one(
     let source = plan.source_material(values)?;
     let appearance = gallery.appearance(&source);
     let mut objective = Match { gallery, source: &source, appearance: &appearance, stop };
-    let method: Box<dyn Search> = match plan.search.as_str() {
-        // With neighbours to start from, a wide initial population only costs renders.
-        "genetic" if !problem.guesses.is_empty() => Box::new(Genetic::new(GeneticSettings::continued())),
-        name => by_name(name).map_err(RemapError::Search)?,
-    };
-    method.run(problem, &mut objective).map_err(RemapError::Search)
+    let mut run = |method: &dyn Search| method.run(problem, &mut objective).map_err(RemapError::Search);
+    if plan.search != "genetic" || problem.guesses.is_empty() {
+        return run(&*by_name(&plan.search).map_err(RemapError::Search)?);
+    }
+    // With neighbours to start from, a wide initial population would only cost renders ...
+    let near = run(&Genetic::new(GeneticSettings::continued()))?;
+    if problem.guesses.iter().any(|guess| is_near(guess, &near.best)) {
+        return Ok(near);
+    }
+    // ... unless they did not foresee the result: then it may be any local optimum.
+    let wide = run(&Genetic::default())?;
+    let evaluations = near.evaluations + wide.evaluations;
+    let best = if (wide.fitness, &wide.best) < (near.fitness, &near.best) { wide } else { near };
+    Ok(Outcome { evaluations, ..best })
+}
+
+/// True where two points differ by no more than [`FORESEEN`] levels along each axis.
+fn is_near(a: &Point, b: &Point) -> bool {
+    a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= FORESEEN)
 }
 
 fn entry(

@@ -20,6 +20,9 @@ use crate::{Rgb, SceneError, rgb};
 #[cfg(test)]
 mod accuracy;
 
+/// Pixels that are rendered by one thread without a break.
+const BLOCK: usize = 256;
+
 /// Which part of a material is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
@@ -127,26 +130,59 @@ impl Renderer {
 
     /// What the specular lobe adds to each subject pixel, linear RGB.
     pub fn specular_pixels(&self, bsdf: &dyn Bsdf) -> Vec<[f32; 3]> {
+        self.specular_batch(&[bsdf]).swap_remove(0)
+    }
+
+    /// [`Renderer::specular_pixels`] of several materials at once, in their order: the prepared light is read once for all.
+    pub fn specular_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
+        let is_ring = |b: &&dyn Bsdf| b.sampling().is_some() && b.is_isotropic();
+        let rings: Vec<usize> = (0..bsdfs.len()).filter(|i| is_ring(&bsdfs[*i])).collect();
+        let mut images: Vec<Vec<[f32; 3]>> = bsdfs
+            .iter()
+            .map(|b| if is_ring(b) { Vec::new() } else { self.directly_integrated(*b) })
+            .collect();
+        let lobes: Vec<&dyn Bsdf> = rings.iter().map(|i| bsdfs[*i]).collect();
+        for (i, image) in rings.into_iter().zip(self.ring_batch(&lobes)) {
+            images[i] = image;
+        }
+        images
+    }
+
+    /// Isotropic lobes through the ring transport.
+    fn ring_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
+        let lobes: Vec<LobeTable> = bsdfs.par_iter().map(|b| LobeTable::new(*b)).collect();
+        let count = bsdfs.len();
+        if count == 0 {
+            return Vec::new();
+        }
+        let block = |first: usize| -> Vec<Rgb> {
+            let last = (first + BLOCK).min(self.subjects.len());
+            let mut sums = vec![Rgb::ZERO; (last - first) * count];
+            for (k, sums) in (first..last).zip(sums.chunks_mut(count)) {
+                match &self.transport {
+                    Some(transport) => transport[k].add_radiance(&lobes, sums),
+                    None => PixelLight::gather(&self.field, &self.film, self.subjects[k] as usize)
+                        .add_radiance(&lobes, sums),
+                }
+                sums.iter_mut().zip(bsdfs).for_each(|(sum, b)| *sum += self.highlights.radiance(k, *b));
+            }
+            sums
+        };
+        let firsts = (0..self.subjects.len()).into_par_iter().step_by(BLOCK);
+        let blocks: Vec<Vec<Rgb>> = firsts.map(block).collect();
+        let image = |m: usize| {
+            let pixels = blocks.iter().flat_map(|sums| sums.iter().skip(m).step_by(count));
+            pixels.map(|v| [v.x, v.y, v.z]).collect()
+        };
+        (0..count).into_par_iter().map(image).collect()
+    }
+
+    /// A lobe that is not isotropic through the direct integral; black where there is no lobe.
+    fn directly_integrated(&self, bsdf: &dyn Bsdf) -> Vec<[f32; 3]> {
         if bsdf.sampling().is_none() {
             return vec![[0.0; 3]; self.subjects.len()];
         }
-        let array = |v: Rgb| [v.x, v.y, v.z];
-        if !bsdf.is_isotropic() {
-            let pixel = |(k, pixel): (usize, &u32)| {
-                let lobe = gather::radiance(&self.field, &self.film, *pixel as usize, bsdf, gather::SAMPLES);
-                array(lobe + self.highlights.radiance(k, bsdf))
-            };
-            return self.subjects.par_iter().enumerate().map(pixel).collect();
-        }
-        let lobe = LobeTable::new(bsdf);
-        let pixel = |(k, pixel): (usize, &u32)| {
-            let rings = match &self.transport {
-                Some(transport) => transport[k].radiance(&lobe),
-                None => PixelLight::gather(&self.field, &self.film, *pixel as usize).radiance(&lobe),
-            };
-            array(rings + self.highlights.radiance(k, bsdf))
-        };
-        self.subjects.par_iter().enumerate().map(pixel).collect()
+        self.gathered_pixels(bsdf, gather::SAMPLES)
     }
 
     /// What the diffuse term adds to each subject pixel, linear RGB.
@@ -160,7 +196,6 @@ impl Renderer {
     }
 
     /// The direct integral of a lobe with a chosen number of samples: slow, and independent of the ring transport.
-    #[cfg(test)]
     fn gathered_pixels(&self, bsdf: &dyn Bsdf, samples: u32) -> Vec<[f32; 3]> {
         let pixel = |(k, pixel): (usize, &u32)| {
             let lobe = gather::radiance(&self.field, &self.film, *pixel as usize, bsdf, samples);

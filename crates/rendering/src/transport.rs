@@ -61,9 +61,10 @@ impl PixelLight {
         Self { main, more: lights.collect() }
     }
 
-    /// Radiance towards the eye through a lobe.
-    pub(crate) fn radiance(&self, lobe: &LobeTable) -> Rgb {
-        self.more.iter().fold(self.main.radiance(lobe), |sum, light| sum + light.radiance(lobe))
+    /// Adds the radiance towards the eye through each of some lobes.
+    pub(crate) fn add_radiance(&self, lobes: &[LobeTable], sums: &mut [Rgb]) {
+        add_radiance(&self.main, lobes, sums);
+        self.more.iter().for_each(|light| add_radiance(light, lobes, sums));
     }
 }
 
@@ -96,16 +97,6 @@ impl ViewLight {
         let moments = std::array::from_fn(|c| std::array::from_fn(|i| sums[i / TERMS][i % TERMS][c]));
         let theta = points.iter().map(View::angle).sum::<f64>() / points.len().max(1) as f64;
         Self { moments, angle: AnglePosition::new(theta) }
-    }
-
-    fn radiance(&self, lobe: &LobeTable) -> Rgb {
-        let [red, green, blue] = &self.moments;
-        if lobe.is_grey() {
-            let [r, g, b] = dot3(lobe.rows(0, self.angle), red, green, blue);
-            return Rgb::new(r, g, b, 0.0);
-        }
-        let channel = |c: usize| dot(lobe.rows(c, self.angle), &self.moments[c]);
-        Rgb::new(channel(0), channel(1), channel(2), 0.0)
     }
 }
 
@@ -230,38 +221,61 @@ fn normal_spread(points: &[View]) -> f64 {
     ((6.0 * variance).sqrt() / n.sqrt()).min(PI / 16.0)
 }
 
-/// Lanes of the sums: a fixed number, so that every instruction set adds in the same order.
+/// Lanes of the sums: a fixed number, so that all instruction sets add in the same order.
 const LANES: usize = 8;
 const _: () = assert!(ROW.is_multiple_of(LANES));
 
-/// `Σ (a + t (b − a)) m` for three channels at once.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn dot3(
-    (a, b, t): (&[f32; ROW], &[f32; ROW], f32),
-    red: &[f32; ROW],
-    green: &[f32; ROW],
-    blue: &[f32; ROW],
-) -> [f32; 3] {
-    let mut sums = [[0.0f32; LANES]; 3];
-    for i in (0..ROW).step_by(LANES) {
-        for l in 0..LANES {
-            let coefficient = a[i + l] + t * (b[i + l] - a[i + l]);
-            sums[0][l] += coefficient * red[i + l];
-            sums[1][l] += coefficient * green[i + l];
-            sums[2][l] += coefficient * blue[i + l];
-        }
+/// Adds `Σ c_jk J_jk` of one view of a pixel for each lobe: the moments stay in the first cache while the lobes pass by.
+fn add_radiance(light: &ViewLight, lobes: &[LobeTable], sums: &mut [Rgb]) {
+    for (lobe, sum) in lobes.iter().zip(sums) {
+        let [red, green, blue] = &light.moments;
+        let [r, g, b] = if lobe.is_grey() {
+            let (low, high, t) = lobe.rows(0, light.angle);
+            blended_dots(low, high, t, [red, green, blue])
+        } else {
+            std::array::from_fn(|c| {
+                let (low, high, t) = lobe.rows(c, light.angle);
+                blended_dots(low, high, t, [&light.moments[c]])[0]
+            })
+        };
+        *sum += Rgb::new(r, g, b, 0.0);
     }
-    sums.map(|lanes| lanes.iter().sum())
 }
 
-/// `Σ (a + t (b − a)) m` for one channel.
+/// `Σ (a + t (b − a)) m` for each of some moments.
+fn blended_dots<const N: usize>(
+    a: &[f32; ROW],
+    b: &[f32; ROW],
+    t: f32,
+    moments: [&[f32; ROW]; N],
+) -> [f32; N] {
+    let mut coefficients = [0.0; ROW];
+    blend(a, b, t, &mut coefficients);
+    moments.map(|m| dot(&coefficients, m))
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn dot((a, b, t): (&[f32; ROW], &[f32; ROW], f32), moments: &[f32; ROW]) -> f32 {
+fn blend(a: &[f32; ROW], b: &[f32; ROW], t: f32, out: &mut [f32; ROW]) {
+    for i in 0..ROW {
+        out[i] = a[i] + t * (b[i] - a[i]);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn dot(a: &[f32; ROW], b: &[f32; ROW]) -> f32 {
     let mut sums = [0.0f32; LANES];
-    for i in (0..ROW).step_by(LANES) {
+    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
         for l in 0..LANES {
-            sums[l] += (a[i + l] + t * (b[i + l] - a[i + l])) * moments[i + l];
+            sums[l] += a[l] * b[l];
         }
     }
-    sums.iter().sum()
+    // Hides from the optimiser how the lanes are added up: it would split them into pairs from the start.
+    let sums = std::hint::black_box(sums);
+    total(&sums)
+}
+
+/// The sum of all lanes, in pairs: a chain of additions would take longer than all that comes before it.
+#[inline(always)]
+fn total(l: &[f32; LANES]) -> f32 {
+    ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]))
 }
