@@ -224,7 +224,7 @@ fn bad_requests_are_refused_with_what_would_be_accepted() {
         of,
         &["render", "reference", "--material", "ward", "--size", "8", "-o", "out.jpg"],
         1,
-        &[".exr and .png"],
+        &[".exr or .png"],
     );
     refused(of, &["render", "reference", "--material", "ward", "-o", "no/out.exr"], 1, &["no folder"]);
     refused(of, &["render", "scene.toml", "--material", "ward", "-o", "out.exr"], 1, &["scene.toml"]);
@@ -243,6 +243,25 @@ fn bad_requests_are_refused_with_what_would_be_accepted() {
     );
     refused(of, &["remap", "ward", "ggx", "--fix", "ro=0.1", "-o", "p.json"], 2, &["parameter 'ro'"]);
     refused(of, &["remap", "ward", "ggx", "--search", "exaustive", "-o", "p.json"], 2, &["exhaustive"]);
+    refused(of, &["remap", "ward", "ggx", "--size", "1", "-o", "p.json"], 2, &["16 to 2048"]);
+    let both = [
+        "remap",
+        "ward",
+        "ggx",
+        "--vary",
+        "roughness=0.1:0.3:0.1",
+        "--fix",
+        "roughness_u=0.1",
+        "-o",
+        "p.json",
+    ];
+    refused(of, &both, 2, &["'roughness' and 'roughness_u' both set roughness_u"]);
+    refused(
+        of,
+        &["compare", "--source", "ward", "--target", "ggx", "--size", "0", "-o", "pair"],
+        1,
+        &["1 to 8192"],
+    );
     refused(of, &["apply", "none.json", "specular=0.1"], 1, &["none.json"]);
     let left: Vec<_> = std::fs::read_dir(of).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(left.is_empty(), "failures left {left:?} behind");
@@ -288,6 +307,8 @@ fn damaged_probes_are_refused() {
     damaged(&|p| p["entries"] = serde_json::json!([]), &["0 entries", "1 points"]);
     damaged(&|p| p["from"]["model"] = "wrad".into(), &["did you mean 'ward'?"]);
     damaged(&|p| p["entries"][0]["target"][1] = 0.5.into(), &["ior", "outside its range"]);
+    damaged(&|p| p["entries"][0]["source"][0] = 0.3.into(), &["entry 0", "out of order"]);
+    damaged(&|p| p["entries"][0]["target"][0] = 0.5.into(), &["entry 0", "off the target axes"]);
     damaged(&|p| p["entries"][0]["fitness"] = Json::Null, &["fitness"]);
     std::fs::write(of.join("cut.json"), "{\"format\": \"lookmatch-probe\"").unwrap();
     refused(of, &["apply", "cut.json", "specular=0.1"], 1, &["cut.json", "not JSON"]);

@@ -7,13 +7,19 @@ use std::path::Path;
 ///
 /// The bytes go to a temporary file in the same folder, which is flushed, synchronised to the disk and then
 /// renamed over `path`. If `write` or anything else fails, the old file (if there was one) stays as it was and
-/// the temporary file is removed. A symbolic link at `path` is replaced, not followed.
+/// the temporary file is removed. A symbolic link at `path` is followed. A device, a pipe or a folder is refused: a
+/// rename would put a file in its place.
 ///
 /// The new file has ordinary permissions (read and write for all, less the process's umask).
 ///
 /// # Errors
 /// Whatever `write` returned, or the operating system's refusal to create, write or rename the file.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let path = target.as_path();
+    if path.exists() && !path.is_file() {
+        return Err(io::Error::other("it exists and is no ordinary file"));
+    }
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -65,6 +71,19 @@ mod tests {
         assert_eq!(error.unwrap_err().to_string(), "stopped");
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_folders_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("a.txt"), folder.path().join("link.txt"));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_atomically(&link, |out| out.write_all(b"new")).unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert!(write_atomically(folder.path(), |_| Ok(())).is_err());
     }
 
     #[test]

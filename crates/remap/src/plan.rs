@@ -126,6 +126,9 @@ pub struct Plan {
     pub size: usize,
 }
 
+/// Sides of the reference pictures that can be compared: smaller ones show no highlight.
+const SIZES: std::ops::RangeInclusive<usize> = 16..=2048;
+
 /// Levels of a source axis in a quick remap, at most.
 const QUICK_LEVELS: usize = 6;
 
@@ -138,6 +141,7 @@ impl Plan {
         lookmatch_search::by_name(&options.search).map_err(|e| RemapError::Option(e.to_string()))?;
         let mut source = Draft::new(from, from.surveyed, |r| r.survey)?;
         let mut target = Draft::new(to, to.searched, |r| r.search)?;
+        check_names(options, from, to)?;
         for vary in &options.vary {
             let draft = pick(vary.side, &vary.name, &mut source, &mut target)?;
             draft.vary(&vary.name, vary.levels)?;
@@ -150,6 +154,12 @@ impl Plan {
             return Err(RemapError::Option(format!(
                 "every parameter of {} is fixed; leave one to vary",
                 if source.axes.is_empty() { from.name } else { to.name }
+            )));
+        }
+        if options.size.is_some_and(|size| !SIZES.contains(&size)) {
+            let (least, most) = (SIZES.start(), SIZES.end());
+            return Err(RemapError::Option(format!(
+                "reference pictures have {least} to {most} pixels a side"
             )));
         }
         if options.preset != Some(Preset::Paper) {
@@ -212,6 +222,27 @@ pub(crate) fn carry_over(
         }
         if let Some(value) = source.by_role(parameter.role) {
             target.set_value(index, value)?;
+        }
+    }
+    Ok(())
+}
+
+/// Refuses two options that speak of the same parameter of the same model.
+fn check_names(options: &Options, from: &Model, to: &Model) -> Result<(), RemapError> {
+    let mut taken: Vec<(&str, usize, &str)> = Vec::new();
+    let varied = options.vary.iter().map(|v| (v.side, v.name.as_str()));
+    let fixed = options.fix.iter().map(|f| (f.side, f.name.as_str()));
+    for (side, name) in varied.chain(fixed) {
+        let in_source = side != Some(Side::Target) && (side.is_some() || from.resolve(name).is_ok());
+        let (label, model) = if in_source { ("source", from) } else { ("target", to) };
+        for index in model.resolve(name)? {
+            if let Some((_, _, other)) = taken.iter().find(|(l, i, _)| *l == label && *i == index) {
+                return Err(RemapError::Option(format!(
+                    "'{other}' and '{name}' both set {} of the {label} model {}; give one of them",
+                    model.parameters[index].name, model.name
+                )));
+            }
+            taken.push((label, index, name));
         }
     }
     Ok(())

@@ -162,6 +162,19 @@ impl Probe {
         &self.entries[place]
     }
 
+    /// Indices of the source axes of the entry at a place.
+    fn indices(&self, mut place: usize) -> Vec<usize> {
+        let mut indices: Vec<usize> = (self.source_axes.iter().rev())
+            .map(|axis| {
+                let index = place % axis.len();
+                place /= axis.len();
+                index
+            })
+            .collect();
+        indices.reverse();
+        indices
+    }
+
     /// The source material of an entry.
     pub fn source_material(&self, values: &[f64]) -> Result<Material, RemapError> {
         plan::material(&self.from, &self.source_axes, values)
@@ -202,6 +215,20 @@ impl Probe {
                 return Err(format!("entry {place} lacks a value or holds one that is not finite"));
             }
             self.target_material(&self.from, &entry.target).map_err(|e| format!("entry {place}: {e}"))?;
+            if self
+                .indices(place)
+                .iter()
+                .zip(&self.source_axes)
+                .map(|(i, a)| a.value(*i))
+                .ne(entry.source.iter().copied())
+            {
+                return Err(format!("entry {place} is of the source point {:?}, out of order", entry.source));
+            }
+            let on_lattice =
+                self.target_axes.iter().zip(&entry.target).all(|(a, v)| a.index_of(*v).is_some());
+            if !on_lattice {
+                return Err(format!("entry {place}: the target {:?} is off the target axes", entry.target));
+            }
         }
         Ok(())
     }

@@ -130,7 +130,8 @@ fn luminance(c: Rgb) -> f64 {
 
 /// Splits a map into one without peaks and the lamps that it lost.
 fn take_lamps(grid: &Grid, texels: &[Rgb]) -> (Vec<Rgb>, Vec<(DVec3, Rgb)>) {
-    let limit = LAMP * grid.mean(texels);
+    // A black map has no lamps; the smallest positive limit keeps their share from being 0/0.
+    let limit = (LAMP * grid.mean(texels)).max(f64::MIN_POSITIVE);
     let excess = |t: Rgb| t * (1.0 - limit / luminance(t).max(limit)) as f32;
     let dimmed = texels.iter().map(|t| *t - excess(*t)).collect();
     let bright: Vec<usize> = (0..texels.len()).filter(|i| excess(texels[*i]) != Rgb::ZERO).collect();
@@ -221,6 +222,14 @@ mod tests {
         assert!(map.radiance(DVec3::Y, 0.0).y < 0.01, "+Y is the first row");
         let turned = EnvironmentMap::new(&image, 2.0, 90.0);
         assert!((turned.radiance(DVec3::Z, 0.0).x - 2.0 * 15.5).abs() < 0.02, "what was at +X is at +Z");
+    }
+
+    #[test]
+    fn a_black_map_gives_no_light() {
+        let map = EnvironmentMap::new(&Image::new(16, 8), 1.0, 0.0);
+        assert!(map.lamps.is_empty());
+        assert!(map.lights.iter().all(|(direction, power)| direction.is_finite() && *power == Rgb::ZERO));
+        assert_eq!(map.dimmed_radiance(DVec3::X, 0.1), Rgb::ZERO);
     }
 
     #[test]

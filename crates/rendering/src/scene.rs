@@ -216,9 +216,31 @@ impl Scene {
         let mut faults = self.camera.faults();
         faults.push(Fault::new("sphere", "missing", !self.spheres.is_empty(), "at least one [[sphere]]"));
         faults.extend(self.spheres.iter().enumerate().flat_map(|(k, s)| s.faults(k)));
+        faults.extend(self.overlaps());
         faults.extend(self.plane.iter().flat_map(Plane::faults));
         faults.extend(self.point_lights.iter().enumerate().flat_map(|(k, l)| l.faults(k)));
         faults.extend(self.environment.iter().flat_map(EnvironmentLight::faults));
+        faults
+    }
+}
+
+impl Scene {
+    /// Spheres that swallow the camera or each other: rays are traced from outside all of them.
+    fn overlaps(&self) -> Vec<Fault> {
+        let distance = |a: [f64; 3], b: [f64; 3]| glam::DVec3::from(a).distance(b.into());
+        let mut faults = Vec::new();
+        for (k, sphere) in self.spheres.iter().enumerate() {
+            let field = format!("sphere[{k}].centre");
+            let value = format!("{:?}", sphere.centre);
+            let outside = distance(self.camera.eye, sphere.centre) > sphere.radius;
+            faults.push(Fault::new(&field, &value, outside, "a place whose sphere does not hold the camera"));
+            for other in &self.spheres[..k] {
+                // Spheres that touch are told apart from overlapping ones by more than rounding.
+                let apart =
+                    distance(other.centre, sphere.centre) > (other.radius + sphere.radius) * (1.0 - 1e-9);
+                faults.push(Fault::new(&field, &value, apart, "a place apart from the other spheres"));
+            }
+        }
         faults
     }
 }

@@ -216,12 +216,12 @@ impl GeneticSettings {
     /// [`GeneticSettings::lookmatch`] costs.
     pub fn continued() -> GeneticSettings {
         GeneticSettings {
-            population_per_axis: 1,
-            population_min: 5,
+            population_per_axis: 2,
+            population_min: 6,
             start: Start::Near,
             stall_generations: 1,
             polish_starts: 1,
-            polish_radius: 1,
+            polish_radius: 2,
             ..GeneticSettings::lookmatch()
         }
     }

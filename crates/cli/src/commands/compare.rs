@@ -12,13 +12,13 @@ pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
     let (source, target) = (material(&args.source)?, material(&args.target)?);
     let (scene, illumination) = lit_scene(&args.scene, &args.light)?;
     let scene = scene.for_model(source.model()).for_model(target.model());
-    create_folder(&args.output)?;
     let progress = spinner("rendering");
     let renderer = Renderer::prepare(&scene, illumination, args.size)?.keep_transport();
     let (a, b) = (renderer.render(&source, Part::Full), renderer.render(&target, Part::Full));
     progress.finish_and_clear();
     let (whole, masked) = (nrmsd(&a, &b, None)?, nrmsd(&a, &b, Some(renderer.mask()))?);
     let (map, scale) = error_map(&a, &b, None)?;
+    create_folder(&args.output)?;
     let file = |name: &str| args.output.join(name);
     let notes = |material: &dyn ToString| [("lookmatch:material".to_owned(), material.to_string())];
     write(&file("source.exr"), &a, &notes(&source))?;

@@ -37,10 +37,11 @@ pub(crate) fn run(args: &EvalArgs) -> anyhow::Result<()> {
 
 /// The value of one vector; null where the model is not known.
 fn evaluate(vector: &Vector) -> Json {
-    let value = conformance::bsdf(&vector.model, &vector.params).map(|bsdf| {
+    let value = conformance::bsdf(&vector.model, &vector.params).and_then(|bsdf| {
         let f = bsdf.evaluate(vector.wi, vector.wo);
-        // Models of one channel have one number.
-        if f[0] == f[1] && f[1] == f[2] { json!(f[0]) } else { json!(f) }
+        // Models of one channel have one number; what is no direction has no value.
+        let value = if f[0] == f[1] && f[1] == f[2] { json!(f[0]) } else { json!(f) };
+        f.iter().all(|v| v.is_finite()).then_some(value)
     });
     json!({ "id": vector.id, "f": value })
 }

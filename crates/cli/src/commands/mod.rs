@@ -50,14 +50,23 @@ pub(crate) fn create_folder(folder: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot create folder '{}'", folder.display()))
 }
 
+/// Refuses a picture whose format is not one that is written, before any work is done.
+pub(crate) fn check_picture(path: &Path) -> anyhow::Result<()> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if !matches!(extension.as_str(), "exr" | "png") {
+        anyhow::bail!("cannot write '{}': a picture ends in .exr or .png", path.display());
+    }
+    check_output(path)
+}
+
 /// Refuses an output whose folder does not exist, before any work is done.
 pub(crate) fn check_output(path: &Path) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         anyhow::bail!("cannot write '{}': there is no folder '{}'", path.display(), folder.display());
     }
-    if path.is_dir() {
-        anyhow::bail!("cannot write '{}': it is a folder", path.display());
+    if path.exists() && !path.is_file() {
+        anyhow::bail!("cannot write '{}': it exists and is no ordinary file", path.display());
     }
     Ok(())
 }

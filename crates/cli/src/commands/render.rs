@@ -7,13 +7,13 @@ use lookmatch_rendering::{Part, Renderer};
 use serde_json::json;
 
 use crate::args::RenderArgs;
-use crate::commands::{check_output, lit_scene, material};
+use crate::commands::{check_picture, lit_scene, material};
 use crate::output::{print_json, spinner};
 
 pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let material = material(&args.material)?;
     let (scene, illumination) = lit_scene(&args.scene, &args.light)?;
-    check_output(&args.output)?;
+    check_picture(&args.output)?;
     let started = Instant::now();
     let progress = spinner("rendering");
     let renderer = Renderer::prepare(&scene.for_model(material.model()), illumination, args.size)?;
