@@ -191,7 +191,7 @@ impl GeneticSettings {
     /// Against [`GeneticSettings::guarnera2018`]: a Latin hypercube to start from; three-way tournaments,
     /// wider crossover (b = 0.5) and mutation after it (p_m = 0.1); children outside the bounds move to them;
     /// children seen before make room for new points near by; an early stop, relative to the fitness itself;
-    /// then descents from the three best basins. On synthetic matches it was not tuned on (`tests/measure.rs`
+    /// then descents from the three best basins. On synthetic matches it was not tuned on (`benches/synthetic.rs`
     /// with other sources) it found the optimum in 99.4 to 100 % of runs, the published settings in 97 to
     /// 99.4 %, for 9 % more evaluations on 3,010 points, 10 % fewer on 11,900 and 16 % fewer on 48,160.
     pub fn lookmatch() -> GeneticSettings {

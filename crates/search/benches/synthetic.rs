@@ -1,14 +1,13 @@
 //! Success rates and costs of the presets on synthetic matches:
-//! `cargo test -p lookmatch-search --test measure -- --ignored --nocapture`.
+//! `cargo bench -p lookmatch-search`, half a minute.
 
+#[path = "../tests/common/mod.rs"]
 mod common;
 
 use common::{Scene, Score, sources};
 use lookmatch_search::registry;
 
-#[test]
-#[ignore = "a measurement, half a minute"]
-fn presets() {
+fn main() {
     let scenes =
         [("2 x 43 x 35", Scene::coarse()), ("2 x 85 x 70", Scene::fine()), ("2 x 344 x 70", Scene::wide())];
     for (label, scene) in &scenes {
