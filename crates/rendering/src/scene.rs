@@ -34,14 +34,31 @@ pub struct Scene {
 #[serde(deny_unknown_fields)]
 pub struct Camera {
     /// Position, in metres.
+    #[serde(deserialize_with = "vector")]
     pub eye: [f64; 3],
     /// The point in the middle of the picture.
+    #[serde(deserialize_with = "vector")]
     pub target: [f64; 3],
     /// The direction that is up in the picture.
-    #[serde(default = "up")]
+    #[serde(default = "up", deserialize_with = "vector")]
     pub up: [f64; 3],
     /// Vertical field of view in degrees, above 0 and below 180.
     pub vertical_fov: f64,
+}
+
+/// Exactly three numbers: left alone, longer arrays would be cut without a word.
+fn vector<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<[f64; 3], D::Error> {
+    let numbers = Vec::<f64>::deserialize(deserializer)?;
+    let count = numbers.len();
+    numbers.try_into().map_err(|_| serde::de::Error::invalid_length(count, &"three numbers"))
+}
+
+#[derive(Deserialize)]
+struct Vector(#[serde(deserialize_with = "vector")] [f64; 3]);
+
+fn optional_vector<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 3]>, D::Error> {
+    let Some(Vector(v)) = Option::<Vector>::deserialize(deserializer)? else { return Ok(None) };
+    Ok(Some(v))
 }
 
 fn up() -> [f64; 3] {
@@ -53,11 +70,12 @@ fn up() -> [f64; 3] {
 #[serde(deny_unknown_fields)]
 pub struct Sphere {
     /// Centre, in metres.
+    #[serde(deserialize_with = "vector")]
     pub centre: [f64; 3],
     /// Radius in metres, above 0.
     pub radius: f64,
     /// A diffuse reflectance of its own (linear RGB) instead of the material's, for materials that have one.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "optional_vector")]
     pub diffuse: Option<[f64; 3]>,
 }
 
@@ -72,8 +90,10 @@ pub struct Plane {
     /// Side of a check, in metres.
     pub check_size: f64,
     /// Albedo of the light checks, linear RGB.
+    #[serde(deserialize_with = "vector")]
     pub light: [f64; 3],
     /// Albedo of the dark checks, linear RGB.
+    #[serde(deserialize_with = "vector")]
     pub dark: [f64; 3],
 }
 
@@ -82,8 +102,10 @@ pub struct Plane {
 #[serde(deny_unknown_fields)]
 pub struct PointLight {
     /// Position, in metres.
+    #[serde(deserialize_with = "vector")]
     pub position: [f64; 3],
     /// Radiant intensity in W/sr, linear RGB.
+    #[serde(deserialize_with = "vector")]
     pub intensity: [f64; 3],
 }
 

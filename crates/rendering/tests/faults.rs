@@ -43,6 +43,19 @@ fn fails(from: &str, to: &str, parts: &[&str]) {
 }
 
 #[test]
+fn vectors_have_three_numbers() {
+    fails("eye = [0, 0, 6]", "eye = [0, 0, 6, 1]", &["length 4", "three numbers", "eye"]);
+    fails("radius = 1", "radius = 1\ndiffuse = [0.5, 0.5]", &["length 2", "three numbers"]);
+}
+
+#[test]
+fn spheres_hold_neither_each_other_nor_the_camera() {
+    fails("radius = 1", "radius = 7", &["sphere[0].centre", "does not hold the camera"]);
+    let twin = "radius = 1\n[[sphere]]\ncentre = [1, 0, 0]\nradius = 1";
+    fails("radius = 1", twin, &["sphere[1].centre", "apart from the other spheres"]);
+}
+
+#[test]
 fn a_good_scene_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let scene = load(folder.path(), GOOD).unwrap();
