@@ -45,13 +45,25 @@ impl Film {
         (self.forward + self.right * (x * scale - 1.0) + self.up * (1.0 - y * scale)).normalize()
     }
 
-    /// Where a point appears on the film, in pixels from the top left corner; `None` behind the camera.
-    pub(crate) fn project(&self, point: DVec3) -> Option<[f64; 2]> {
-        let to_point = point - self.eye;
-        let depth = to_point.dot(self.forward);
-        let on_film = |axis: DVec3| to_point.dot(axis) / (depth * axis.length_squared());
+    /// The image of a sphere as a disc: centre and radius in pixels from the top left corner; `None` where it does not
+    /// lie wholly before the camera.
+    ///
+    /// The image is an ellipse with the semi-axes `sin α cos α/q` and `sin α/√q` about `tan β cos² β/q`, where α is the
+    /// sphere's angular radius, β the angle of its centre to the line of sight and `q = cos² β − sin² α`. The disc has
+    /// the ellipse's centre and area.
+    pub(crate) fn disc(&self, centre: DVec3, radius: f64) -> Option<[f64; 3]> {
+        let to_centre = centre - self.eye;
+        let (depth, distance) = (to_centre.dot(self.forward), to_centre.length());
+        let (sin_a, cos2_b) = (radius / distance, (depth / distance).powi(2));
+        let q = cos2_b - sin_a * sin_a;
+        if depth <= 0.0 || q <= 0.0 {
+            return None;
+        }
         let half = self.size as f64 / 2.0;
-        (depth > 0.0).then(|| [half * (1.0 + on_film(self.right)), half * (1.0 - on_film(self.up))])
+        let on_film = |axis: DVec3| to_centre.dot(axis) / (depth * axis.length_squared()) * cos2_b / q;
+        let mean_axis = sin_a * (1.0 - sin_a * sin_a).powf(0.25) / q.powf(0.75);
+        let radius = mean_axis / self.up.length() * half;
+        Some([half * (1.0 + on_film(self.right)), half * (1.0 - on_film(self.up)), radius])
     }
 
     /// Directions through the first `count` sub-pixel positions of a pixel (row by row from the top left).
@@ -111,4 +123,27 @@ pub(crate) fn to_local(frame: &[DVec3; 3], w: DVec3) -> [f64; 3] {
 /// The direction with given coordinates in a frame.
 pub(crate) fn to_world(frame: &[DVec3; 3], w: [f64; 3]) -> DVec3 {
     frame[0] * w[0] + frame[1] * w[1] + frame[2] * w[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scene;
+
+    #[test]
+    fn a_disc_has_the_centre_and_area_of_the_image() {
+        let mut scene = Scene::spheres();
+        scene.spheres.truncate(1);
+        let (bodies, film) = (Bodies::new(&scene), Film::new(&scene.camera, 120));
+        let (mut area, mut moments) = (0.0, [0.0; 2]);
+        for pixel in 0..120 * 120 {
+            let share = film.subject_points(&bodies, pixel, SUBSAMPLES).len() as f64 / f64::from(SUBSAMPLES);
+            area += share;
+            moments[0] += share * ((pixel % 120) as f64 + 0.5);
+            moments[1] += share * ((pixel / 120) as f64 + 0.5);
+        }
+        let [x, y, radius] = film.disc(DVec3::from(scene.spheres[0].centre), 1.0).unwrap();
+        assert!((moments[0] / area - x).abs() < 0.02 && (moments[1] / area - y).abs() < 0.02, "{x} {y}");
+        assert!((std::f64::consts::PI * radius * radius / area - 1.0).abs() < 2e-3, "{radius}");
+    }
 }

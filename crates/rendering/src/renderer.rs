@@ -85,7 +85,7 @@ impl Renderer {
         let subjects: Vec<u32> = (0..hits.len() as u32).filter(|i| hits[*i as usize]).collect();
         let diffuse = subjects.par_iter().map(|p| diffuse_light(scene, &field, &film, *p as usize)).collect();
         let highlights = Highlights::prepare(&field, &film, &subjects);
-        let mask = subject_mask(scene, &field, &film)?;
+        let mask = subject_mask(scene, &film)?;
         Ok(Self { field, film, background, subjects, diffuse, highlights, transport: None, mask })
     }
 
@@ -255,19 +255,12 @@ fn diffuse_light(scene: &Scene, field: &Field, film: &Film, pixel: usize) -> Dif
     light
 }
 
-/// The radial mask of every sphere. A sphere's image is nearly a disc: its centre is the image of the sphere's centre, its
-/// radius that of the disc of equal area.
-fn subject_mask(scene: &Scene, field: &Field, film: &Film) -> Result<Mask, SceneError> {
-    let size = film.size;
-    let sees = |pixel: usize, sphere: usize| {
-        let direction = film.direction((pixel % size) as f64 + 0.5, (pixel / size) as f64 + 0.5);
-        matches!(field.bodies.first(film.eye, direction, None), Some((_, Body::Sphere(s))) if s == sphere)
-    };
-    let mut mask = Mask::disc(size, size, 0.0, 0.0, 0.0);
-    for (k, sphere) in scene.spheres.iter().enumerate() {
-        let area = (0..size * size).into_par_iter().filter(|pixel| sees(*pixel, k)).count() as f64;
-        if let Some([x, y]) = film.project(sphere.centre.into()) {
-            mask = mask.union(&Mask::disc(size, size, x, y, (area / std::f64::consts::PI).sqrt()))?;
+/// The radial mask of every sphere.
+fn subject_mask(scene: &Scene, film: &Film) -> Result<Mask, SceneError> {
+    let mut mask = Mask::disc(film.size, film.size, 0.0, 0.0, 0.0);
+    for sphere in &scene.spheres {
+        if let Some([x, y, radius]) = film.disc(sphere.centre.into(), sphere.radius) {
+            mask = mask.union(&Mask::disc(film.size, film.size, x, y, radius))?;
         }
     }
     Ok(mask)
