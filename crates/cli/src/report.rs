@@ -4,11 +4,10 @@ use std::path::Path;
 
 use lookmatch_imaging::{Image, error_map, write as write_image, write_atomically};
 use lookmatch_materials::Material;
-use lookmatch_remap::{Baseline, MethodScores, Probe, ValidationReport, apply, validation_points};
-use lookmatch_rendering::{Illumination, Part, Renderer, Scene};
+use lookmatch_remap::{Baseline, MethodScores, Probe, ValidationReport, Validator, validation_points};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::commands::validate::with_progress;
+use crate::commands::validate::{prepared, with_progress};
 use crate::output::{score, table};
 
 /// Side of the pictures in pixels.
@@ -18,17 +17,16 @@ const PICTURED: [f64; 2] = [0.2, 0.75];
 
 /// Validates a probe and writes `index.html`, `validation.json`, `validation.txt` and the pictures.
 pub(crate) fn write(probe: &Probe, folder: &Path) -> anyhow::Result<ValidationReport> {
-    let validation = with_progress(probe, &None, &validation_points(probe, None), SIZE)?;
+    let validator = prepared(probe, &None, SIZE)?;
+    let validation = with_progress(&validator, &validation_points(probe, None))?;
     let text = scores_table(&validation);
     let file =
         |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));
     file("validation.json", &serde_json::to_string_pretty(&validation)?)?;
     file("validation.txt", &text)?;
-    let scene = Scene::spheres().for_model(probe.from.model()).for_model(probe.to.model());
-    let renderer = Renderer::prepare(&scene, Illumination::All, SIZE)?.keep_transport();
     let mut strips = Vec::new();
     for (k, place) in pictured(probe).into_iter().enumerate() {
-        strips.push(strip(probe, &renderer, place, &folder.join(format!("match-{k}.png")))?);
+        strips.push(strip(&validator, place, &folder.join(format!("match-{k}.png")))?);
     }
     file("index.html", &page(probe, &validation, &strips).into_string())?;
     eprint!("{text}");
@@ -93,30 +91,25 @@ struct Strip {
 }
 
 /// Renders source, probe and baselines beside each other, and below each its difference from the source, all on one scale.
-fn strip(probe: &Probe, renderer: &Renderer, place: usize, path: &Path) -> anyhow::Result<Strip> {
-    let source = probe.source_material(&probe.entries[place].source)?;
-    let target = apply(probe, &source, false)?.target;
-    let reference = renderer.render(&source, Part::Full);
-    let mut columns = vec!["probe"];
-    let mut images = vec![renderer.render(&target, Part::Full)];
-    for rule in Baseline::ALL {
-        if let Some(material) = rule.apply(&source, &probe.to)? {
-            columns.push(rule.title());
-            images.push(renderer.render(&material, Part::Full));
-        }
-    }
+fn strip(validator: &Validator, place: usize, path: &Path) -> anyhow::Result<Strip> {
+    let (source, targets) = validator.materials(place)?;
+    let titles = std::iter::once("probe").chain(Baseline::ALL.map(Baseline::title));
+    let (mut columns, targets): (Vec<&str>, Vec<Material>) =
+        titles.zip(targets).filter_map(|(title, target)| Some((title, target?))).unzip();
+    let reference = validator.render(&[&source]).swap_remove(0);
+    let images = validator.render(&targets.iter().collect::<Vec<_>>());
     let scales = images.iter().map(|image| Ok(error_map(&reference, image, None)?.1));
     let scale = scales.collect::<anyhow::Result<Vec<f32>>>()?.into_iter().fold(0.0, f32::max);
     let error = |image: &Image| -> anyhow::Result<Image> { Ok(error_map(&reference, image, Some(scale))?.0) };
     let errors = images.iter().map(error).collect::<anyhow::Result<Vec<_>>>()?;
-    let none = Image::new(renderer.size(), renderer.size());
+    let none = Image::new(reference.width(), reference.height());
     let row = |first: &Image, rest: &[Image]| {
         Image::beside(&std::iter::once(first).chain(rest).collect::<Vec<_>>())
     };
     write_image(path, &above(&row(&reference, &images), &row(&none, &errors)), &[])?;
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     columns.insert(0, "source");
-    Ok(Strip { file, source, target, columns, scale })
+    Ok(Strip { file, source, target: targets[0].clone(), columns, scale })
 }
 
 /// One picture above another of the same width.

@@ -1,5 +1,5 @@
 //! BRDF Difference Probes: what to search ([`Plan`]), how ([`remap()`]), the result ([`Probe`]), and how good it is
-//! ([`validate()`]).
+//! ([`Validator`]).
 //!
 //! A probe maps the parameters of a source model to those of a target model, such that renderings of a reference
 //! scene look alike (Guarnera *et al.* 2018). The program never looks at either model's formula to find it: it compares
@@ -27,5 +27,5 @@ pub use probe::{Entry, Metric, Probe, Totals};
 pub use stage::{Appearance, Stage};
 pub use strategy::{Event, remap};
 pub use validate::{
-    Lighting, MethodScores, Scores, Statistics, ValidationReport, validate, validation_points,
+    Lighting, MethodScores, Scores, Statistics, ValidationReport, Validator, validation_points,
 };

@@ -95,10 +95,9 @@ impl Stage {
 
     /// NRMSD per channel of the full pictures under the environment, whole image: without and with the mask.
     pub fn nrmsd(&self, source: &Material, target: &Material) -> Result<[[f64; 3]; 2], RemapError> {
-        let (a, b) =
-            (self.environment.render(source, Part::Full), self.environment.render(target, Part::Full));
-        let plain = lookmatch_imaging::nrmsd(&a, &b, None)?;
-        Ok([plain, lookmatch_imaging::nrmsd(&a, &b, Some(self.environment.mask()))?])
+        let images = self.environment.render_batch(&[source, target], Part::Full);
+        let nrmsd = |mask| lookmatch_imaging::nrmsd(&images[0], &images[1], mask);
+        Ok([nrmsd(None)?, nrmsd(Some(self.environment.mask()))?])
     }
 
     fn diffuse_appearance(&self, material: &Material, albedo: [f64; 3]) -> Arc<Appearance> {

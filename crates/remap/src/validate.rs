@@ -104,76 +104,94 @@ trait FoldDistinct: Iterator<Item = usize> + Sized {
 
 impl<I: Iterator<Item = usize>> FoldDistinct for I {}
 
-/// Renders source and target at some of a probe's entries in the three-sphere scene and scores them, beside the baselines.
-///
-/// `observe` is told of each finished point.
-///
-/// # Errors
-/// Where the environment map cannot be read or a material cannot be made.
-pub fn validate(
-    probe: &Probe,
-    lighting: &Lighting,
-    points: &[usize],
-    size: usize,
-    observe: &(dyn Fn() + Sync),
-) -> Result<ValidationReport, RemapError> {
-    let scene = scene(probe, lighting);
-    let renderer = Renderer::prepare(&scene, Illumination::All, size)?.keep_transport();
-    let rows = points
-        .par_iter()
-        .map(|place| {
-            let row = score_point(probe, &renderer, *place);
-            observe();
-            row
-        })
-        .collect::<Result<Vec<_>, RemapError>>()?;
-    let names = std::iter::once("probe").chain(Baseline::ALL.map(Baseline::title));
-    let methods: Vec<MethodScores> = names
-        .enumerate()
-        .filter_map(|(k, name)| {
-            let scores: Option<Vec<_>> = rows.iter().map(|row| row[k]).collect();
-            Some(MethodScores { method: name.into(), scores: summarise(&scores?) })
-        })
-        .collect();
-    let mean = |m: &MethodScores| m.scores.masked.iter().map(|s| s.mean).sum::<f64>();
-    let probe_is_best = methods[1..].iter().all(|m| mean(&methods[0]) < mean(m));
-    let environment = scene.environment.map(|e| e.map).unwrap_or_default();
-    Ok(ValidationReport {
-        scene: scene.name,
-        environment,
-        size,
-        points: points.len(),
-        methods,
-        probe_is_best,
-    })
+/// The three-sphere scene under one light, prepared for the models of a probe.
+pub struct Validator<'a> {
+    probe: &'a Probe,
+    scene: Scene,
+    renderer: Renderer,
 }
 
-/// The three-sphere scene as both models of a probe can wear it.
-fn scene(probe: &Probe, lighting: &Lighting) -> Scene {
-    let mut scene = Scene::spheres().for_model(probe.from.model()).for_model(probe.to.model());
-    if let Some(map) = lighting {
-        scene.environment = Some(EnvironmentLight::of(map));
+impl<'a> Validator<'a> {
+    /// Prepares the scene for pictures of `size` × `size` pixels.
+    ///
+    /// # Errors
+    /// Where the environment map cannot be read.
+    pub fn prepare(probe: &'a Probe, lighting: &Lighting, size: usize) -> Result<Self, RemapError> {
+        let mut scene = Scene::spheres().for_model(probe.from.model()).for_model(probe.to.model());
+        if let Some(map) = lighting {
+            scene.environment = Some(EnvironmentLight::of(map));
+        }
+        let renderer = Renderer::prepare(&scene, Illumination::All, size)?.keep_transport();
+        Ok(Self { probe, scene, renderer })
     }
-    scene
+
+    /// Scores the probe at some of its entries, beside the baselines; `observe` is told of each finished entry.
+    ///
+    /// # Errors
+    /// Where a material cannot be made.
+    pub fn validate(
+        &self,
+        points: &[usize],
+        observe: &(dyn Fn() + Sync),
+    ) -> Result<ValidationReport, RemapError> {
+        let row = |place: &usize| {
+            let row = self.score(*place);
+            observe();
+            row
+        };
+        let rows = points.par_iter().map(row).collect::<Result<Vec<_>, RemapError>>()?;
+        let names = std::iter::once("probe").chain(Baseline::ALL.map(Baseline::title));
+        let methods: Vec<MethodScores> = names
+            .enumerate()
+            .filter_map(|(k, name)| {
+                let scores: Option<Vec<_>> = rows.iter().map(|row| row[k]).collect();
+                Some(MethodScores { method: name.into(), scores: summarise(&scores?) })
+            })
+            .collect();
+        let mean = |m: &MethodScores| m.scores.masked.iter().map(|s| s.mean).sum::<f64>();
+        let probe_is_best = methods[1..].iter().all(|m| mean(&methods[0]) < mean(m));
+        let environment = self.scene.environment.as_ref().map(|e| e.map.clone()).unwrap_or_default();
+        let (scene, size, points) = (self.scene.name.clone(), self.renderer.size(), points.len());
+        Ok(ValidationReport { scene, environment, size, points, methods, probe_is_best })
+    }
+
+    /// The source material of an entry, what the probe makes of it, and what each baseline that applies does.
+    ///
+    /// # Errors
+    /// Where a material cannot be made.
+    pub fn materials(&self, place: usize) -> Result<(Material, Vec<Option<Material>>), RemapError> {
+        let source = self.probe.source_material(&self.probe.entries[place].source)?;
+        let mut targets = vec![Some(apply(self.probe, &source, false)?.target)];
+        for rule in Baseline::ALL {
+            targets.push(rule.apply(&source, &self.probe.to)?);
+        }
+        Ok((source, targets))
+    }
+
+    /// Pictures of some materials in the scene, in their order.
+    pub fn render(&self, materials: &[&Material]) -> Vec<Image> {
+        self.renderer.render_batch(materials, Part::Full)
+    }
+
+    /// Scores of the probe and of each baseline that applies.
+    fn score(&self, place: usize) -> Result<Vec<Option<Score>>, RemapError> {
+        let (source, targets) = self.materials(place)?;
+        let materials: Vec<&Material> = std::iter::once(&source).chain(targets.iter().flatten()).collect();
+        let mut images = self.render(&materials).into_iter();
+        let Some(reference) = images.next() else { return Ok(Vec::new()) };
+        let score = |image: Image| -> Result<Score, RemapError> {
+            let masked = nrmsd(&reference, &image, Some(self.renderer.mask()))?;
+            Ok([nrmsd(&reference, &image, None)?, masked])
+        };
+        targets
+            .iter()
+            .map(|target| target.as_ref().and_then(|_| images.next()).map(score).transpose())
+            .collect()
+    }
 }
 
 /// NRMSD whole and masked.
 type Score = [[f64; 3]; 2];
-
-/// Scores of the probe and of each baseline that applies.
-fn score_point(probe: &Probe, renderer: &Renderer, place: usize) -> Result<Vec<Option<Score>>, RemapError> {
-    let source = probe.source_material(&probe.entries[place].source)?;
-    let reference = renderer.render(&source, Part::Full);
-    let score = |target: &Material| -> Result<Score, RemapError> {
-        let image: Image = renderer.render(target, Part::Full);
-        Ok([nrmsd(&reference, &image, None)?, nrmsd(&reference, &image, Some(renderer.mask()))?])
-    };
-    let mut scores = vec![Some(score(&apply(probe, &source, false)?.target)?)];
-    for rule in Baseline::ALL {
-        scores.push(rule.apply(&source, &probe.to)?.map(|target| score(&target)).transpose()?);
-    }
-    Ok(scores)
-}
 
 fn summarise(scores: &[Score]) -> Scores {
     let channel =

@@ -97,19 +97,30 @@ impl Renderer {
 
     /// A picture of a material, linear RGB, row 0 on top.
     pub fn render(&self, material: &Material, part: Part) -> Image {
-        let diffuse = self.diffuse_pixels(material);
+        self.render_batch(&[material], part).swap_remove(0)
+    }
+
+    /// Pictures of several materials, in their order: the prepared light is read once for all.
+    pub fn render_batch(&self, materials: &[&Material], part: Part) -> Vec<Image> {
+        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(|m| m.bsdf()).collect();
+        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
         let specular = match part {
-            Part::Full => self.specular_pixels(&*material.bsdf()),
-            Part::DiffuseOnly => vec![[0.0; 3]; self.subjects.len()],
+            Part::Full => self.specular_batch(&bsdfs),
+            Part::DiffuseOnly => vec![vec![[0.0; 3]; self.subjects.len()]; materials.len()],
         };
-        let mut pixels: Vec<[f32; 3]> = self.background.iter().map(|b| [b.x, b.y, b.z]).collect();
+        materials.iter().zip(&specular).map(|(m, s)| self.developed(&self.diffuse_pixels(m), s)).collect()
+    }
+
+    /// The background with the subject pixels laid over it.
+    fn developed(&self, diffuse: &[[f32; 3]], specular: &[[f32; 3]]) -> Image {
+        let mut image = Image::new(self.film.size, self.film.size);
+        for (out, b) in image.pixels_mut().iter_mut().zip(&self.background) {
+            *out = [b.x, b.y, b.z];
+        }
         for (k, pixel) in self.subjects.iter().enumerate() {
-            let out = &mut pixels[*pixel as usize];
+            let out = &mut image.pixels_mut()[*pixel as usize];
             (0..3).for_each(|c| out[c] += diffuse[k][c] + specular[k][c]);
         }
-        let size = self.film.size;
-        let mut image = Image::new(size, size);
-        image.pixels_mut().copy_from_slice(&pixels);
         image
     }
 

@@ -1,11 +1,11 @@
 //! `lookmatch validate`: how good a probe is where its search never looked.
 
-use lookmatch_remap::{Probe, ValidationReport, validate, validation_points};
+use lookmatch_remap::{Lighting, Probe, ValidationReport, Validator, validation_points};
 
 use crate::Usage;
 use crate::args::ValidateArgs;
 use crate::commands::check_output;
-use crate::output::{bar, print, print_json};
+use crate::output::{bar, print, print_json, spinner};
 use crate::report::scores_table;
 
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
@@ -16,14 +16,14 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     if let Some(output) = &args.output {
         check_output(output)?;
     }
-    let lights: Vec<Option<String>> = match args.light.as_slice() {
+    let lights: Vec<Lighting> = match args.light.as_slice() {
         [] => vec![None],
         files => files.iter().cloned().map(Some).collect(),
     };
     let points = validation_points(&probe, args.points);
     let reports = lights
         .iter()
-        .map(|light| with_progress(&probe, light, &points, args.size))
+        .map(|light| with_progress(&prepared(&probe, light, args.size)?, &points))
         .collect::<anyhow::Result<Vec<_>>>()?;
     if let Some(output) = &args.output {
         let text = serde_json::to_string_pretty(&reports)?;
@@ -36,15 +36,18 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     print(&text.join("\n"))
 }
 
-/// Validates under one light with a progress bar.
-pub(crate) fn with_progress(
-    probe: &Probe,
-    light: &Option<String>,
-    points: &[usize],
-    size: usize,
-) -> anyhow::Result<ValidationReport> {
+/// Prepares the validation scene under a light, with a sign of life.
+pub(crate) fn prepared<'a>(probe: &'a Probe, light: &Lighting, size: usize) -> anyhow::Result<Validator<'a>> {
+    let progress = spinner("preparing the validation scene");
+    let validator = Validator::prepare(probe, light, size)?;
+    progress.finish_and_clear();
+    Ok(validator)
+}
+
+/// Validates at some entries with a progress bar.
+pub(crate) fn with_progress(validator: &Validator, points: &[usize]) -> anyhow::Result<ValidationReport> {
     let progress = bar(points.len(), "validating");
-    let report = validate(probe, light, points, size, &|| progress.inc(1))?;
+    let report = validator.validate(points, &|| progress.inc(1))?;
     progress.finish_and_clear();
     Ok(report)
 }
