@@ -162,6 +162,7 @@ impl Plan {
                 "reference pictures have {least} to {most} pixels a side"
             )));
         }
+        target.follow(&source)?;
         if options.preset != Some(Preset::Paper) {
             target.widen(highest_f0(&source)?)?;
         }
@@ -300,6 +301,36 @@ impl Draft {
         Ok(place)
     }
 
+    /// Searches the parameters behind an alias (`roughness_u` and `roughness_v` behind `roughness`) one by one where the
+    /// source does not tie them: an anisotropic source has an anisotropic target.
+    fn follow(&mut self, source: &Draft) -> Result<(), RemapError> {
+        let model = self.fixed.model();
+        for alias in model.aliases {
+            let is_tied =
+                self.axes.iter().any(|a| a.name == alias.name) && !self.given.iter().any(|n| n == alias.name);
+            if !is_tied || source.ties(alias.parameters)? {
+                continue;
+            }
+            for name in alias.parameters {
+                if let Some(range) = model.parameter(name)?.range() {
+                    self.vary(name, range.search)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// True where some parameters always have the same value; also where there are none of that name.
+    fn ties(&self, names: &[&str]) -> Result<bool, RemapError> {
+        let model = self.fixed.model();
+        if names.iter().any(|name| model.resolve(name).is_err()) {
+            return Ok(true);
+        }
+        let values = names.iter().map(|name| self.fixed.number(name)).collect::<Result<Vec<f64>, _>>()?;
+        let varies_alone = self.axes.iter().any(|axis| names.contains(&axis.name.as_str()));
+        Ok(!varies_alone && values.iter().all(|v| *v == values[0]))
+    }
+
     /// Extends the lattice of an index of refraction, or of a specular reflectance without Fresnel effect, to the normal
     /// reflectance that the source reaches, unless the user gave that lattice.
     fn widen(&mut self, f0: Option<f64>) -> Result<(), RemapError> {
@@ -424,6 +455,15 @@ mod tests {
         assert_eq!(plan.source_axes[0].levels, [0.1, 0.2, 0.3]);
         assert_eq!(plan.from.number("specular").unwrap(), 0.1);
         assert_eq!(plan.target_axes[1].levels, [1.3, 1.4, 1.5, 1.6]);
+    }
+
+    #[test]
+    fn an_anisotropic_source_has_an_anisotropic_target() {
+        let names = |plan: &Plan| plan.target_axes.iter().map(|a| a.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&plan("ward", "ggx", &Options::default())), ["specular", "ior", "roughness"]);
+        let brushed = Assignment { side: None, name: "roughness_u".into(), value: "0.05".into() };
+        let options = Options { fix: vec![brushed], ..Options::default() };
+        assert_eq!(names(&plan("ward", "ggx", &options)), ["specular", "ior", "roughness_u", "roughness_v"]);
     }
 
     #[test]
