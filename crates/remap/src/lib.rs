@@ -14,6 +14,7 @@ mod plan;
 mod probe;
 mod stage;
 mod strategy;
+mod table;
 mod validate;
 
 pub use lookmatch_search::Axis;

@@ -4,11 +4,13 @@ use std::path::Path;
 
 use lookmatch_materials::Role;
 use lookmatch_search::{
-    Bounds, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError, by_name,
+    Bounds, Exhaustive, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError,
+    by_name,
 };
 
 use crate::gallery::{Gallery, Match, Stopped};
 use crate::journal::Journal;
+use crate::table::FitnessTable;
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
 
 /// Levels by which a result may differ from what its neighbours foresaw.
@@ -65,6 +67,10 @@ pub fn remap(
     }
     let pairing = Pairing::new(plan)?;
     let mut gallery = Gallery::new(plan, stage, &lattice);
+    let table = match plan.search.as_str() {
+        "exhaustive" if resumed < total => FitnessTable::fill(plan, stage, &lattice, &sources, stop)?,
+        _ => None,
+    };
     let mut done = resumed;
     for (place, indices) in sources.points(&Bounds::full(&sources)).enumerate() {
         if found[place].is_some() {
@@ -77,7 +83,13 @@ pub fn remap(
                 found[place_of(&sources, p)].as_ref().map(|(point, _)| point)
             }),
         };
-        let outcome = match search_one(plan, &mut gallery, &values, &problem, stop) {
+        let searched = match &table {
+            Some(table) => {
+                Exhaustive::default().run(&problem, &mut table.objective(place)).map_err(RemapError::Search)
+            }
+            None => search_one(plan, &mut gallery, &values, &problem, stop),
+        };
+        let outcome = match searched {
             Err(RemapError::Search(SearchError::Objective(e))) if e.is::<Stopped>() => {
                 return Err(RemapError::Interrupted { done, total });
             }
