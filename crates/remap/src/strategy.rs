@@ -24,6 +24,13 @@ pub enum Event {
         /// How many.
         done: usize,
     },
+    /// Before an exhaustive search: target points that were compared with all source points.
+    Compared {
+        /// Compared points.
+        done: usize,
+        /// All points of the target lattice.
+        total: usize,
+    },
     /// A source point is finished.
     Point {
         /// Finished points.
@@ -68,7 +75,9 @@ pub fn remap(
     let pairing = Pairing::new(plan)?;
     let mut gallery = Gallery::new(plan, stage, &lattice);
     let table = match plan.search.as_str() {
-        "exhaustive" if resumed < total => FitnessTable::fill(plan, stage, &lattice, &sources, stop)?,
+        "exhaustive" if resumed < total => {
+            FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop)?
+        }
         _ => None,
     };
     let mut done = resumed;

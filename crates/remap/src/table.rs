@@ -7,7 +7,7 @@ use lookmatch_search::{Bounds, Lattice, Objective, ObjectiveError, Point};
 use rayon::prelude::*;
 
 use crate::stage::{Appearance, Stage};
-use crate::{Plan, RemapError};
+use crate::{Event, Plan, RemapError};
 
 /// Targets that are rendered at once.
 const BLOCK: usize = 64;
@@ -26,6 +26,7 @@ impl<'a> FitnessTable<'a> {
         stage: &Stage,
         lattice: &'a Lattice,
         sources: &Lattice,
+        observe: &mut dyn FnMut(Event),
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Self>, RemapError> {
         if !targets_are_shared(plan)? {
@@ -39,6 +40,7 @@ impl<'a> FitnessTable<'a> {
             materials.chunks(BLOCK).flat_map(|block| stage.appearances(block)).collect();
         let mut rows: Vec<Row> = materials.into_iter().zip(seen).map(Row::new).collect();
         let points: Vec<Point> = lattice.points(&Bounds::full(lattice)).collect();
+        let mut done = 0;
         for block in points.chunks(BLOCK) {
             if stop() {
                 return Ok(None);
@@ -54,6 +56,8 @@ impl<'a> FitnessTable<'a> {
                 .zip(targets.iter().map(|t| t.bsdf().sampling().is_some()))
                 .collect();
             rows.par_iter_mut().try_for_each(|row| row.extend(plan, stage, &values, &targets))?;
+            done += block.len();
+            observe(Event::Compared { done, total: points.len() });
         }
         Ok(Some(Self { lattice, rows: rows.into_iter().map(|row| row.fitness).collect() }))
     }

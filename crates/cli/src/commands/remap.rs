@@ -71,7 +71,11 @@ fn search(plan: &Plan, args: &RemapArgs) -> anyhow::Result<Probe> {
             progress.set_position(done as u64);
             progress.suspend(|| eprintln!("going on after {done} source points of an earlier run"));
         }
-        Event::Point { done, .. } => progress.set_position(done as u64),
+        Event::Compared { done, total } => progress.set_message(format!("comparing {done}/{total} targets;")),
+        Event::Point { done, .. } => {
+            progress.set_message("matching");
+            progress.set_position(done as u64);
+        }
     };
     let state = journal_path(&args.output);
     let stop = || stopped.load(Ordering::Relaxed);
