@@ -3,7 +3,7 @@
 //! Each target is rendered once and compared with all sources, instead of once for every source.
 
 use lookmatch_materials::{Material, Role};
-use lookmatch_search::{Bounds, Lattice, Objective, ObjectiveError, Point};
+use lookmatch_search::{Bounds, Lattice, Objective, ObjectiveFn, Point};
 use rayon::prelude::*;
 
 use crate::stage::{Appearance, Stage};
@@ -65,18 +65,10 @@ impl<'a> FitnessTable<'a> {
     /// The objective of the source point at a place.
     pub(crate) fn objective(&self, place: usize) -> impl Objective {
         let row = &self.rows[place];
-        Lookup(move |point: &Point| {
+        ObjectiveFn(move |point: &Point| {
             let levels = self.lattice.axes.iter().map(|axis| axis.len());
             row[point.iter().zip(levels).fold(0, |index, (i, n)| index * n + *i as usize)]
         })
-    }
-}
-
-struct Lookup<F>(F);
-
-impl<F: Fn(&Point) -> f64> Objective for Lookup<F> {
-    fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, ObjectiveError> {
-        Ok(points.iter().map(&self.0).collect())
     }
 }
 
