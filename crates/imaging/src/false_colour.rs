@@ -1,6 +1,6 @@
 //! Pictures of differences, for people.
 
-use crate::{Image, ImageError, delta_e76, lab_from_linear_srgb, srgb_decode};
+use crate::{Image, ImageError, srgb_decode};
 
 /// Map of the per-pixel L2 distance in linear RGB, as in the paper's figures (Guarnera et al. 2018, figure 9).
 ///
@@ -12,26 +12,10 @@ use crate::{Image, ImageError, delta_e76, lab_from_linear_srgb, srgb_decode};
 /// # Errors
 /// Different sizes; a scale that is not finite and positive.
 pub fn error_map(a: &Image, b: &Image, scale: Option<f32>) -> Result<(Image, f32), ImageError> {
-    map(a, b, scale, |a, b| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt())
-}
-
-/// The same as [`error_map`] for ΔE*76, whose unit is about half a just noticeable difference.
-///
-/// # Errors
-/// As [`error_map`].
-pub fn delta_e_map(a: &Image, b: &Image, scale: Option<f32>) -> Result<(Image, f32), ImageError> {
-    map(a, b, scale, |a, b| delta_e76(lab_from_linear_srgb(a), lab_from_linear_srgb(b)))
-}
-
-fn map(
-    a: &Image,
-    b: &Image,
-    scale: Option<f32>,
-    distance: impl Fn([f64; 3], [f64; 3]) -> f64,
-) -> Result<(Image, f32), ImageError> {
     a.check_same_size(b)?;
-    let pairs = a.pixels().iter().zip(b.pixels());
-    let distances: Vec<f64> = pairs.map(|(a, b)| distance(a.map(f64::from), b.map(f64::from))).collect();
+    let distance =
+        |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>().sqrt();
+    let distances: Vec<f64> = a.pixels().iter().zip(b.pixels()).map(distance).collect();
     let scale = match scale {
         Some(value) if !(value.is_finite() && value > 0.0) => {
             return Err(ImageError::Scale { value });
@@ -77,7 +61,7 @@ mod tests {
     #[test]
     fn equal_images_give_a_dark_map() {
         let a = Image::from_fn(2, 2, |x, y| [x as f32, y as f32, 1.0]);
-        let (map, scale) = delta_e_map(&a, &a, None).unwrap();
+        let (map, scale) = error_map(&a, &a, None).unwrap();
         assert_eq!(scale, 1.0);
         assert!(map.pixels().iter().all(|&pixel| luminance(pixel) < 1e-3));
     }

@@ -84,18 +84,6 @@ impl Image {
         Err(ImageError::SizeMismatch { width: self.width, height: self.height, other_width, other_height })
     }
 
-    /// `self - other`, pixel by pixel in linear RGB: the specular part of a full and a diffuse rendering.
-    /// Values can be negative.
-    ///
-    /// # Errors
-    /// [`ImageError::SizeMismatch`] if the sizes differ.
-    pub fn minus(&self, other: &Image) -> Result<Image, ImageError> {
-        self.check_same_size(other)?;
-        let difference = |(a, b): (&[f32; 3], &[f32; 3])| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-        let pixels = self.pixels.iter().zip(&other.pixels).map(difference).collect();
-        Ok(Image { pixels, ..*self })
-    }
-
     /// The images side by side from left to right, aligned at the top; room below lower ones stays black.
     pub fn beside(images: &[&Image]) -> Image {
         let width = images.iter().map(|image| image.width).sum();
@@ -139,13 +127,5 @@ mod tests {
     fn sizes_in_the_message() {
         let error = Image::new(3, 2).check_same_size(&Image::new(2, 3)).unwrap_err();
         assert!(error.to_string().contains("3 x 2 against 2 x 3"), "{error}");
-        assert!(Image::new(3, 2).minus(&Image::new(2, 3)).is_err());
-    }
-
-    #[test]
-    fn minus_keeps_negative_values() {
-        let a = Image::from_fn(1, 1, |_, _| [1.0, 2.0, 3.0]);
-        let b = Image::from_fn(1, 1, |_, _| [3.0, 2.0, 1.0]);
-        assert_eq!(a.minus(&b).unwrap().get(0, 0), [-2.0, 0.0, 2.0]);
     }
 }

@@ -16,7 +16,7 @@ mod metrics;
 pub use atomic::write_atomically;
 pub use colour::{delta_e76, lab_from_linear_srgb, luminance, srgb_decode, srgb_encode};
 pub use error::ImageError;
-pub use false_colour::{delta_e_map, error_map};
+pub use false_colour::error_map;
 pub use file::{MAX_PIXELS, decode, read, write};
 pub use image::Image;
 pub use lab::{lab_planes, squared_distance, weighted_squared_distance};

@@ -1,5 +1,6 @@
 //! Target materials that were rendered already: the paper's database of renderings, in memory and bounded.
 
+use std::collections::HashSet;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -35,15 +36,13 @@ pub(crate) struct Gallery<'a> {
     stage: &'a Stage,
     lattice: &'a lookmatch_search::Lattice,
     kept: LruCache<Key, Arc<Appearance>>,
-    /// How many targets were rendered, again or for the first time.
-    pub(crate) renders: usize,
 }
 
 impl<'a> Gallery<'a> {
     pub(crate) fn new(plan: &'a Plan, stage: &'a Stage, lattice: &'a lookmatch_search::Lattice) -> Self {
-        let size = stage.appearance(&plan.to.diffuse_only()).bytes().max(1);
-        let count = NonZeroUsize::new(CAPACITY / size).unwrap_or(NonZeroUsize::MIN);
-        Self { plan, stage, lattice, kept: LruCache::new(count), renders: 0 }
+        let count =
+            NonZeroUsize::new(CAPACITY / stage.appearance_bytes().max(1)).unwrap_or(NonZeroUsize::MIN);
+        Self { plan, stage, lattice, kept: LruCache::new(count) }
     }
 
     /// A source material as it is seen.
@@ -69,7 +68,6 @@ impl<'a> Gallery<'a> {
             }
         }
         let (keys, new): (Vec<_>, Vec<_>) = missing.into_iter().unzip();
-        self.renders += new.len();
         let rendered = self.stage.appearances(&new).into_iter().map(Arc::new);
         let fresh: Vec<(Key, Arc<Appearance>)> = keys.into_iter().zip(rendered).collect();
         // Everything is looked up before anything is stored: a large batch must not push out its own members.
@@ -92,6 +90,8 @@ pub(crate) struct Match<'a, 'b> {
     pub(crate) gallery: &'a mut Gallery<'b>,
     pub(crate) source: &'a Material,
     pub(crate) appearance: &'a Appearance,
+    /// Points that were compared so far, also by an earlier search of the same source.
+    pub(crate) compared: HashSet<Point>,
     /// Asked before each batch; true stops the search.
     pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -107,6 +107,7 @@ impl Objective for Match<'_, '_> {
         if (self.stop)() {
             return Err(Box::new(Stopped));
         }
+        self.compared.extend(points.iter().cloned());
         let targets = self.gallery.look(self.source, points)?;
         let stage = self.gallery.stage;
         let fitness =

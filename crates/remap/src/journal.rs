@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use lookmatch_imaging::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::{Entry, Plan, RemapError};
@@ -60,10 +61,10 @@ impl Journal {
                 }
             }
         }
-        let mut file = File::create(path).map_err(failed)?;
-        for line in kept {
-            writeln!(file, "{line}").map_err(failed)?;
-        }
+        // Rewritten whole or not at all: a kill here must not lose what earlier runs finished.
+        write_atomically(path, |out| kept.iter().try_for_each(|line| writeln!(out, "{line}")))
+            .map_err(failed)?;
+        let file = File::options().append(true).open(path).map_err(failed)?;
         Ok(Self { path: path.to_owned(), file })
     }
 

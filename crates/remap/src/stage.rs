@@ -20,13 +20,6 @@ pub struct Appearance {
     environment: Vec<f32>,
 }
 
-impl Appearance {
-    /// Size in bytes.
-    pub(crate) fn bytes(&self) -> usize {
-        (self.point.len() + self.environment.len()) * size_of::<f32>()
-    }
-}
-
 /// The reference scene, prepared under both lights.
 pub struct Stage {
     point: Renderer,
@@ -55,6 +48,11 @@ impl Stage {
         let weights = plan.mask.then(|| on_subject(point.mask().weights()));
         let diffuse = Mutex::new(HashMap::new());
         Ok(Self { metric: plan.metric, weights, diffuse, point, environment })
+    }
+
+    /// Size of an [`Appearance`]: three planes under each of two lights.
+    pub(crate) fn appearance_bytes(&self) -> usize {
+        2 * 3 * self.point.subjects().len() * size_of::<f32>()
     }
 
     /// Renders materials, on all cores, in their order.

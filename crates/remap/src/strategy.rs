@@ -1,5 +1,6 @@
 //! The remap itself: a search for each source point, alone or led by its neighbours.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use lookmatch_materials::Role;
@@ -37,8 +38,6 @@ pub enum Event {
         done: usize,
         /// All points.
         total: usize,
-        /// Targets rendered so far by this run.
-        renders: usize,
     },
 }
 
@@ -85,6 +84,9 @@ pub fn remap(
         if found[place].is_some() {
             continue;
         }
+        if stop() {
+            return Err(RemapError::Interrupted { done, total });
+        }
         let values = sources.values(&indices);
         let problem = match plan.strategy {
             Strategy::Unconstrained => pairing.alone(&lattice, plan.seed),
@@ -110,7 +112,7 @@ pub fn remap(
         }
         found[place] = Some((outcome.best, entry));
         done += 1;
-        observe(Event::Point { done, total, renders: gallery.renders });
+        observe(Event::Point { done, total });
     }
     if let Some(journal) = journal {
         journal.remove();
@@ -128,7 +130,8 @@ fn search_one(
 ) -> Result<Outcome, RemapError> {
     let source = plan.source_material(values)?;
     let appearance = gallery.appearance(&source);
-    let mut objective = Match { gallery, source: &source, appearance: &appearance, stop };
+    let compared = HashSet::new();
+    let mut objective = Match { gallery, source: &source, appearance: &appearance, compared, stop };
     let mut run = |method: &dyn Search| method.run(problem, &mut objective).map_err(RemapError::Search);
     if plan.search != "genetic" || problem.guesses.is_empty() {
         return run(&*by_name(&plan.search).map_err(RemapError::Search)?);
@@ -140,7 +143,7 @@ fn search_one(
     }
     // ... unless they did not foresee the result: then it may be any local optimum.
     let wide = run(&Genetic::default())?;
-    let evaluations = near.evaluations + wide.evaluations;
+    let evaluations = objective.compared.len();
     let best = if (wide.fitness, &wide.best) < (near.fitness, &near.best) { wide } else { near };
     Ok(Outcome { evaluations, ..best })
 }

@@ -81,28 +81,18 @@ pub fn validation_points(probe: &Probe, count: Option<usize>) -> Vec<usize> {
     // Steps of the golden ratio along the table spread evenly over both axes, where equal steps would fall on
     // few columns.
     let step = |k: usize| ((k as f64 + 0.5) * 0.618_033_988_749_895).fract();
-    let mut points: Vec<usize> = (0..).map(|k| (step(k) * total as f64) as usize).fold_distinct(count);
+    let mut points = Vec::with_capacity(count);
+    for point in (0..).map(|k| (step(k) * total as f64) as usize) {
+        if !points.contains(&point) {
+            points.push(point);
+        }
+        if points.len() == count {
+            break;
+        }
+    }
     points.sort_unstable();
     points
 }
-
-/// The first `count` different numbers of an endless sequence.
-trait FoldDistinct: Iterator<Item = usize> + Sized {
-    fn fold_distinct(self, count: usize) -> Vec<usize> {
-        let mut found = Vec::with_capacity(count);
-        for value in self {
-            if !found.contains(&value) {
-                found.push(value);
-            }
-            if found.len() == count {
-                break;
-            }
-        }
-        found
-    }
-}
-
-impl<I: Iterator<Item = usize>> FoldDistinct for I {}
 
 /// The three-sphere scene under one light, prepared for the models of a probe.
 pub struct Validator<'a> {

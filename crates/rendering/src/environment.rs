@@ -125,7 +125,7 @@ impl Grid {
 }
 
 fn luminance(c: Rgb) -> f64 {
-    f64::from(0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z)
+    f64::from(lookmatch_imaging::luminance([c.x, c.y, c.z]))
 }
 
 /// Splits a map into one without peaks and the lamps that it lost.
