@@ -304,6 +304,7 @@ fn damaged_probes_are_refused() {
     damaged(&|p| p["version"] = 2.into(), &["version is 2", "up to 1"]);
     damaged(&|p| p["format"] = "recipe".into(), &["lookmatch-probe"]);
     damaged(&|p| drop(p.as_object_mut().unwrap().remove("entries")), &["missing field", "entries"]);
+    damaged(&|p| drop(p.as_object_mut().unwrap().remove("preset")), &["missing field", "preset"]);
     damaged(&|p| p["entries"] = serde_json::json!([]), &["0 entries", "1 points"]);
     damaged(&|p| p["from"]["model"] = "wrad".into(), &["did you mean 'ward'?"]);
     damaged(&|p| p["entries"][0]["target"][1] = 0.5.into(), &["ior", "outside its range"]);

@@ -36,7 +36,8 @@ pub struct Probe {
     pub strategy: Strategy,
     /// Search method.
     pub search: String,
-    /// Target ranges.
+    /// Target ranges; null in the file where there is no preset, but never absent.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub preset: Option<Preset>,
     /// Seed.
     pub seed: u64,
