@@ -16,6 +16,9 @@ pub trait Bsdf: Send + Sync {
     /// The same in single precision: what the renderer uses.
     fn specular_f32(&self, g: &Geometry<f32>) -> [f32; 3];
 
+    /// [`Bsdf::specular_f32`] of many geometries, in their order: one call for a whole table.
+    fn specular_all(&self, geometries: &[Geometry<f32>]) -> Vec<[f32; 3]>;
+
     /// Where the specular lobe lies; `None` where there is no lobe at all.
     fn sampling(&self) -> Option<Sampling>;
 
@@ -62,6 +65,9 @@ impl<L: Lobe> Bsdf for L {
     }
     fn specular_f32(&self, g: &Geometry<f32>) -> [f32; 3] {
         Lobe::specular(self, g)
+    }
+    fn specular_all(&self, geometries: &[Geometry<f32>]) -> Vec<[f32; 3]> {
+        geometries.iter().map(|g| Lobe::specular(self, g)).collect()
     }
     fn sampling(&self) -> Option<Sampling> {
         Lobe::sampling(self)

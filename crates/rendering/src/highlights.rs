@@ -28,9 +28,10 @@ type Sample = (Geometry<f32>, Rgb);
 /// Lit samples of every subject pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Highlights {
-    /// Range of `samples` of each subject pixel.
+    /// Where the samples of each subject pixel start, and where the last ends.
     starts: Vec<u32>,
-    samples: Vec<Sample>,
+    geometries: Vec<Geometry<f32>>,
+    irradiances: Vec<Rgb>,
 }
 
 impl Highlights {
@@ -42,18 +43,31 @@ impl Highlights {
             *sum += samples.len() as u32;
             Some(*sum)
         }));
+        let (geometries, irradiances) = per_pixel.into_iter().flatten().unzip();
+        Self { starts, geometries, irradiances }
+    }
 
-        Self { starts, samples: per_pixel.into_iter().flatten().collect() }
+    /// Adds the radiance of all subject pixels towards the eye to three planes, one for each channel.
+    pub(crate) fn add(&self, bsdf: &dyn Bsdf, planes: &mut [Vec<f32>; 3]) {
+        let reflected = bsdf.specular_all(&self.geometries);
+        for (k, range) in self.starts.windows(2).enumerate() {
+            for i in range[0] as usize..range[1] as usize {
+                for c in 0..3 {
+                    planes[c][k] += reflected[i][c] * self.irradiances[i][c];
+                }
+            }
+        }
     }
 
     /// Radiance of subject pixel `k` towards the eye.
     pub(crate) fn radiance(&self, k: usize, bsdf: &dyn Bsdf) -> Rgb {
         let (start, end) = (self.starts[k] as usize, self.starts[k + 1] as usize);
-        let reflected = |(geometry, irradiance): &Sample| {
-            let [r, g, b] = bsdf.specular_f32(geometry);
-            Rgb::new(r, g, b, 0.0) * *irradiance
-        };
-        self.samples[start..end].iter().map(reflected).sum()
+        let reflected = bsdf.specular_all(&self.geometries[start..end]);
+        reflected
+            .iter()
+            .zip(&self.irradiances[start..end])
+            .map(|([r, g, b], e)| Rgb::new(*r, *g, *b, 0.0) * *e)
+            .sum()
     }
 }
 

@@ -1,79 +1,86 @@
 //! A lobe in the basis of the rings, for every angle of view.
 
-use std::f64::consts::FRAC_PI_2;
-use std::sync::OnceLock;
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::LazyLock;
 
 use lookmatch_materials::{Bsdf, Geometry};
 
 use crate::rings::{NODES, ROW, Ring, TERMS, chebyshev, node, project};
 
-/// Tabulated angles of view from 0 to just short of π/2.
-const ANGLES: usize = 65;
+/// Tabulated angles of view from 0 to just short of π/2; between them, cubic interpolation.
+const ANGLES: usize = 49;
 /// Interpolation points on each ring.
 const POINTS: usize = 5;
-/// Quadrature points between two nodes.
-const GAUSS: [(f64, f64); 4] = [
-    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
-    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
-    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
-    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
-];
+/// Quadrature points between two nodes, as fractions of their distance, and their weights (Gauss–Legendre).
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
-/// Coefficients of one lobe: for each channel (one if grey) and angle of view, [`ROW`] numbers.
+/// The coefficients of one lobe at one angle of view, by basis function and channel.
+pub(crate) type Coefficients = [[f32; 3]; ROW];
+
+/// Coefficients of one lobe at every tabulated angle.
 #[derive(Clone, Debug)]
 pub(crate) struct LobeTable {
-    values: Vec<[f32; ROW]>,
-    channels: usize,
-}
-
-/// Where an angle of view lies between two tabulated ones.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AnglePosition {
-    index: u32,
-    fraction: f32,
-}
-
-impl AnglePosition {
-    /// The position of a view at `theta` radians.
-    pub(crate) fn new(theta: f64) -> Self {
-        let x = (theta / spacing()).clamp(0.0, (ANGLES - 1) as f64);
-        let index = (x as usize).min(ANGLES - 2);
-        Self { index: index as u32, fraction: (x - index as f64) as f32 }
-    }
+    angles: Vec<Coefficients>,
 }
 
 impl LobeTable {
     /// Expands the specular lobe of an isotropic BSDF.
     pub(crate) fn new(bsdf: &dyn Bsdf) -> Self {
-        let lobe: Vec<[f32; 3]> = geometries().iter().map(|p| bsdf.specular_f32(&p.geometry)).collect();
-        let grey = lobe.iter().all(|[r, g, b]| r == g && g == b);
-        let channels = if grey { 1 } else { 3 };
-        let mut products = vec![[0.0; ROW]; channels * ANGLES];
-        for (point, f) in geometries().iter().zip(&lobe) {
-            for c in 0..channels {
-                let products = &mut products[c * ANGLES + point.angle];
-                let g = f64::from(f[c]) * point.weight;
-                for k in 0..TERMS {
-                    let term = g * point.terms[k];
-                    products[point.interval * TERMS + k] += (1.0 - point.hat) * term;
-                    products[(point.interval + 1) * TERMS + k] += point.hat * term;
-                }
+        let quadrature = &*QUADRATURE;
+        let lobe = bsdf.specular_all(&quadrature.geometries);
+        let mut products = vec![[[0.0; 3 * TERMS]; NODES]; ANGLES];
+        let mut used = 0;
+        for ring in &quadrature.rings {
+            let (f, weights) = (&lobe[used..used + POINTS], &quadrature.weights[used..used + POINTS]);
+            used += POINTS;
+            let terms = ring_terms(f, weights);
+            let products = &mut products[ring.angle];
+            for (k, term) in terms.iter().enumerate() {
+                products[ring.interval][k] += (1.0 - ring.hat) * term;
+                products[ring.interval + 1][k] += ring.hat * term;
             }
         }
-        products.iter_mut().for_each(project);
-        Self { values: products.iter().map(|row| row.map(|p| p as f32)).collect(), channels }
+        let coefficients = |products: &mut [[f64; 3 * TERMS]; NODES]| -> Coefficients {
+            project(products);
+            std::array::from_fn(|i| std::array::from_fn(|c| products[i / TERMS][3 * (i % TERMS) + c] as f32))
+        };
+        Self { angles: products.iter_mut().map(coefficients).collect() }
     }
 
-    /// The two tabulated rows around an angle of view for a channel, and where the angle lies between them.
-    pub(crate) fn rows(&self, channel: usize, at: AnglePosition) -> (&[f32; ROW], &[f32; ROW], f32) {
-        let start = channel.min(self.channels - 1) * ANGLES + at.index as usize;
-        (&self.values[start], &self.values[start + 1], at.fraction)
+    /// The coefficients at an angle of view, in radians.
+    pub(crate) fn at(&self, theta: f64) -> Coefficients {
+        let x = (theta / spacing()).clamp(0.0, (ANGLES - 1) as f64);
+        let first = (x as usize).saturating_sub(1).min(ANGLES - 4);
+        let weights = cubic(x - first as f64);
+        let mut blended = [[0.0; 3]; ROW];
+        for (weight, row) in weights.iter().zip(&self.angles[first..first + 4]) {
+            for (sum, c) in blended.as_flattened_mut().iter_mut().zip(row.as_flattened()) {
+                *sum += *weight as f32 * c;
+            }
+        }
+        blended
     }
+}
 
-    /// True where all channels share one table.
-    pub(crate) fn is_grey(&self) -> bool {
-        self.channels == 1
+/// The moments of `f` on one ring with each Chebyshev polynomial, channels side by side.
+fn ring_terms(f: &[[f32; 3]], weights: &[f64]) -> [f64; 3 * TERMS] {
+    let mut terms = [0.0; 3 * TERMS];
+    for ((f, weight), polynomials) in f.iter().zip(weights).zip(&*POLYNOMIALS) {
+        let g = f.map(|f| f64::from(f) * weight);
+        for k in 0..TERMS {
+            for c in 0..3 {
+                terms[3 * k + c] += g[c] * polynomials[k];
+            }
+        }
     }
+    terms
+}
+
+/// Lagrange's weights of the points 0, 1, 2, 3 at `x`.
+fn cubic(x: f64) -> [f64; 4] {
+    let (a, b, c, d) = (x, x - 1.0, x - 2.0, x - 3.0);
+    [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0]
 }
 
 /// Distance between tabulated angles; the last lies 1e-3 short of grazing, where no geometry exists.
@@ -81,44 +88,65 @@ fn spacing() -> f64 {
     (FRAC_PI_2 - 1e-3) / (ANGLES - 1) as f64
 }
 
-/// One evaluation of a lobe: the same for every lobe, so worked out once.
-struct Point {
-    geometry: Geometry<f32>,
+/// A ring that lobes are evaluated on: at [`POINTS`] places.
+struct SampledRing {
     angle: usize,
     interval: usize,
     /// Share of the right-hand hat function.
     hat: f64,
-    /// `cos θ_i · 4 cos_d · sin θ_h` times the quadrature weights.
-    weight: f64,
-    /// Chebyshev polynomials with their interpolation weights.
-    terms: [f64; TERMS],
 }
 
-fn geometries() -> &'static [Point] {
-    static POINTS_OF_ALL: OnceLock<Vec<Point>> = OnceLock::new();
-    POINTS_OF_ALL.get_or_init(|| (0..ANGLES).flat_map(points_of_angle).collect())
+/// Where lobes are evaluated: the same for every lobe, so worked out once.
+struct Quadrature {
+    rings: Vec<SampledRing>,
+    geometries: Vec<Geometry<f32>>,
+    /// `cos θ_i · 4 cos_d · sin θ_h` times the quadrature weight, for each geometry.
+    weights: Vec<f64>,
 }
 
-fn points_of_angle(angle: usize) -> Vec<Point> {
-    let theta_o = angle as f64 * spacing();
-    let view = (theta_o.cos(), theta_o.sin());
-    let mut points = Vec::new();
-    for interval in 0..NODES - 1 {
-        let width = node(interval + 1) - node(interval);
-        for (hat, share) in GAUSS {
-            let theta_h = node(interval) + hat * width;
-            let half = (theta_h.cos(), theta_h.sin());
-            let Some(ring) = Ring::new(view, half) else { continue };
-            for i in 0..POINTS {
-                let x = (std::f64::consts::PI * (i as f64 + 0.5) / POINTS as f64).cos();
-                let cos_d = ring.cos_d(x);
-                let Some(geometry) = Geometry::from_half_vector(view, half, cos_d) else { continue };
-                let weight = geometry.cos_i() * 4.0 * cos_d * half.1 * share * width;
-                let mut terms = chebyshev(x).map(|t| t * 2.0 / POINTS as f64);
-                terms[0] /= 2.0;
-                points.push(Point { geometry: geometry.to_f32(), angle, interval, hat, weight, terms });
+static QUADRATURE: LazyLock<Quadrature> = LazyLock::new(|| {
+    let mut quadrature = Quadrature { rings: Vec::new(), geometries: Vec::new(), weights: Vec::new() };
+    for angle in 0..ANGLES {
+        let theta_o = angle as f64 * spacing();
+        for interval in 0..NODES - 1 {
+            for (hat, share) in GAUSS {
+                quadrature.add_ring(SampledRing { angle, interval, hat }, theta_o, share);
             }
         }
     }
-    points
+    quadrature
+});
+
+impl Quadrature {
+    fn add_ring(&mut self, ring: SampledRing, theta_o: f64, share: f64) {
+        let width = node(ring.interval + 1) - node(ring.interval);
+        let theta_h = node(ring.interval) + ring.hat * width;
+        let (view, half) = ((theta_o.cos(), theta_o.sin()), (theta_h.cos(), theta_h.sin()));
+        let Some(cut) = Ring::new(view, half) else { return };
+        let at = |i| {
+            let cos_d = cut.cos_d(interpolation_point(i));
+            let geometry = Geometry::from_half_vector(view, half, cos_d)?;
+            Some((geometry.to_f32(), geometry.cos_i() * 4.0 * cos_d * half.1 * share * width))
+        };
+        let Some(points) = (0..POINTS).map(at).collect::<Option<Vec<_>>>() else { return };
+        self.rings.push(ring);
+        for (geometry, weight) in points {
+            self.geometries.push(geometry);
+            self.weights.push(weight);
+        }
+    }
 }
+
+/// Zeros of the Chebyshev polynomial of degree [`POINTS`].
+fn interpolation_point(i: usize) -> f64 {
+    (PI * (i as f64 + 0.5) / POINTS as f64).cos()
+}
+
+/// Chebyshev polynomials at the interpolation points, with the weights of the discrete transform.
+static POLYNOMIALS: LazyLock<[[f64; TERMS]; POINTS]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let mut terms = chebyshev(interpolation_point(i)).map(|t| t * 2.0 / POINTS as f64);
+        terms[0] /= 2.0;
+        terms
+    })
+});

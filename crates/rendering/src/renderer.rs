@@ -13,15 +13,13 @@ use crate::gather;
 use crate::highlights::Highlights;
 use crate::irradiance::Place;
 use crate::lobe_table::LobeTable;
+use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
-use crate::transport::{PixelLight, gather_all};
+use crate::transport::Transport;
 use crate::{Rgb, SceneError, rgb};
 
 #[cfg(test)]
 mod accuracy;
-
-/// Pixels that are rendered by one thread without a break.
-const BLOCK: usize = 256;
 
 /// Which part of a material is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,12 +38,13 @@ pub struct Renderer {
     film: Film,
     /// What is seen beside the subjects, for every pixel.
     background: Vec<Rgb>,
-    /// Indices of the subject pixels, ascending.
+    /// Indices of the subject pixels, by angle of view.
     subjects: Vec<u32>,
+    rows: Rows,
     diffuse: Vec<DiffuseLight>,
     highlights: Highlights,
     /// Prepared ring transport; without it, it is gathered anew for each picture.
-    transport: Option<Vec<PixelLight>>,
+    transport: Option<Transport>,
     mask: Mask,
 }
 
@@ -82,16 +81,18 @@ impl Renderer {
         let field = Field::bake(scene, illumination)?;
         let film = Film::new(&scene.camera, size);
         let (background, hits) = look(&field, &film);
-        let subjects: Vec<u32> = (0..hits.len() as u32).filter(|i| hits[*i as usize]).collect();
+        let pixels: Vec<u32> = (0..hits.len() as u32).filter(|i| hits[*i as usize]).collect();
+        let rows = Rows::new(&field, &film, &pixels);
+        let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
         let diffuse = subjects.par_iter().map(|p| diffuse_light(scene, &field, &film, *p as usize)).collect();
         let highlights = Highlights::prepare(&field, &film, &subjects);
         let mask = subject_mask(scene, &film)?;
-        Ok(Self { field, film, background, subjects, diffuse, highlights, transport: None, mask })
+        Ok(Self { field, film, background, subjects, rows, diffuse, highlights, transport: None, mask })
     }
 
     /// Keeps the ring transport for all further pictures: about 1 KB per subject pixel.
     pub fn keep_transport(mut self) -> Self {
-        self.transport = Some(gather_all(&self.field, &self.film, &self.subjects));
+        self.transport = Some(Transport::gather(&self.field, &self.film, &self.rows));
         self
     }
 
@@ -124,7 +125,7 @@ impl Renderer {
         image
     }
 
-    /// Indices of the subject pixels in the picture, ascending.
+    /// Indices of the subject pixels in the picture, in the order of everything that is given for them: by angle of view.
     pub fn subjects(&self) -> &[u32] {
         &self.subjects
     }
@@ -161,31 +162,20 @@ impl Renderer {
 
     /// Isotropic lobes through the ring transport.
     fn ring_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
-        let lobes: Vec<LobeTable> = bsdfs.par_iter().map(|b| LobeTable::new(*b)).collect();
-        let count = bsdfs.len();
-        if count == 0 {
+        if bsdfs.is_empty() {
             return Vec::new();
         }
-        let block = |first: usize| -> Vec<Rgb> {
-            let last = (first + BLOCK).min(self.subjects.len());
-            let mut sums = vec![Rgb::ZERO; (last - first) * count];
-            for (k, sums) in (first..last).zip(sums.chunks_mut(count)) {
-                match &self.transport {
-                    Some(transport) => transport[k].add_radiance(&lobes, sums),
-                    None => PixelLight::gather(&self.field, &self.film, self.subjects[k] as usize)
-                        .add_radiance(&lobes, sums),
-                }
-                sums.iter_mut().zip(bsdfs).for_each(|(sum, b)| *sum += self.highlights.radiance(k, *b));
-            }
-            sums
+        let lobes: Vec<LobeTable> = bsdfs.par_iter().map(|b| LobeTable::new(*b)).collect();
+        let images = match &self.transport {
+            Some(transport) => transport.radiance(&lobes),
+            None => Transport::gather(&self.field, &self.film, &self.rows).radiance(&lobes),
         };
-        let firsts = (0..self.subjects.len()).into_par_iter().step_by(BLOCK);
-        let blocks: Vec<Vec<Rgb>> = firsts.map(block).collect();
-        let image = |m: usize| {
-            let pixels = blocks.iter().flat_map(|sums| sums.iter().skip(m).step_by(count));
-            pixels.map(|v| [v.x, v.y, v.z]).collect()
+        let image = |(mut image, bsdf): ([Vec<f32>; 3], &&dyn Bsdf)| {
+            self.highlights.add(*bsdf, &mut image);
+            let [r, g, b] = image;
+            r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect()
         };
-        (0..count).into_par_iter().map(image).collect()
+        images.into_par_iter().zip(bsdfs).map(image).collect()
     }
 
     /// A lobe that is not isotropic through the direct integral; black where there is no lobe.

@@ -14,9 +14,9 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::LazyLock;
 
 /// Nodes of the hat functions.
-pub(crate) const NODES: usize = 24;
+pub(crate) const NODES: usize = 32;
 /// Chebyshev polynomials on each ring.
-pub(crate) const TERMS: usize = 3;
+pub(crate) const TERMS: usize = 4;
 /// Coefficients per channel.
 pub(crate) const ROW: usize = NODES * TERMS;
 
@@ -85,30 +85,36 @@ pub(crate) fn chebyshev(x: f64) -> [f64; TERMS] {
     t
 }
 
-/// Turns the products of a function with the hat functions into the coefficients of its best approximation by them
-/// (L²): solves the tridiagonal system of their mass matrix in place, for columns spaced by `TERMS`.
-pub(crate) fn project(products: &mut [f64; ROW]) {
+/// The tridiagonal mass matrix of the hat functions, factorised: below the diagonal, above it, and one over the pivots.
+static MASS: LazyLock<[[f64; 3]; NODES]> = LazyLock::new(|| {
     let width = |j: usize| node(j + 1) - node(j);
-    let diagonal = |j: usize| {
+    let mut rows = [[0.0; 3]; NODES];
+    let mut upper = 0.0;
+    for (j, row) in rows.iter_mut().enumerate() {
         let left = if j > 0 { width(j - 1) } else { 0.0 };
         let right = if j + 1 < NODES { width(j) } else { 0.0 };
-        (left + right) / 3.0
-    };
-    let mut upper = [0.0; NODES];
-    let mut previous = 0.0;
+        let below = left / 6.0;
+        let pivot = ((left + right) / 3.0 - below * upper).recip();
+        upper = right / 6.0 * pivot;
+        *row = [below, upper, pivot];
+    }
+    rows
+});
+
+/// Turns the products of functions with the hat functions into the coefficients of their best approximations by them
+/// (L²), in place: `products[j]` holds one product for each of `N` functions.
+pub(crate) fn project<const N: usize>(products: &mut [[f64; N]; NODES]) {
     for j in 0..NODES {
-        let below = if j > 0 { width(j - 1) / 6.0 } else { 0.0 };
-        let pivot = diagonal(j) - below * previous;
-        upper[j] = if j + 1 < NODES { width(j) / 6.0 / pivot } else { 0.0 };
-        previous = upper[j];
-        for k in 0..TERMS {
-            let carried = if j > 0 { below * products[(j - 1) * TERMS + k] } else { 0.0 };
-            products[j * TERMS + k] = (products[j * TERMS + k] - carried) / pivot;
+        let [below, _, pivot] = MASS[j];
+        let previous = if j > 0 { products[j - 1] } else { [0.0; N] };
+        for k in 0..N {
+            products[j][k] = (products[j][k] - below * previous[k]) * pivot;
         }
     }
     for j in (0..NODES - 1).rev() {
-        for k in 0..TERMS {
-            products[j * TERMS + k] -= upper[j] * products[(j + 1) * TERMS + k];
+        let next = products[j + 1];
+        for k in 0..N {
+            products[j][k] -= MASS[j][1] * next[k];
         }
     }
 }
@@ -120,18 +126,20 @@ mod tests {
     #[test]
     fn projection_reproduces_its_own_functions() {
         // A function that is a sum of hats has products M c, where M is the mass matrix.
-        let coefficients: [f64; ROW] = std::array::from_fn(|i| (i as f64 * 0.7).sin());
-        let mut products = [0.0; ROW];
+        let coefficients: [[f64; 2]; NODES] =
+            std::array::from_fn(|j| [(j as f64 * 0.7).sin(), (j as f64 * 0.3).cos()]);
+        let mut products = [[0.0; 2]; NODES];
         for j in 0..NODES - 1 {
             let h = node(j + 1) - node(j);
-            for k in 0..TERMS {
-                let (a, b) = (coefficients[j * TERMS + k], coefficients[(j + 1) * TERMS + k]);
-                products[j * TERMS + k] += h * (a / 3.0 + b / 6.0);
-                products[(j + 1) * TERMS + k] += h * (a / 6.0 + b / 3.0);
+            for k in 0..2 {
+                let (a, b) = (coefficients[j][k], coefficients[j + 1][k]);
+                products[j][k] += h * (a / 3.0 + b / 6.0);
+                products[j + 1][k] += h * (a / 6.0 + b / 3.0);
             }
         }
         project(&mut products);
-        assert!((0..ROW).all(|i| (products[i] - coefficients[i]).abs() < 1e-9));
+        let same = |(a, b): (&[f64; 2], &[f64; 2])| (0..2).all(|k| (a[k] - b[k]).abs() < 1e-9);
+        assert!(products.iter().zip(&coefficients).all(same));
     }
 
     #[test]

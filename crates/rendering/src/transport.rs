@@ -1,103 +1,166 @@
 //! Ring transport: the light of every pixel in the basis of the rings. See [`crate::rings`].
 
+use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
-use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::Rgb;
 use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES, SurfacePoint, to_world};
 use crate::highlights::is_near_lamp;
-use crate::lobe_table::{AnglePosition, LobeTable};
+use crate::lobe_table::LobeTable;
+use crate::product::{self, LANES, Lanes, Moments};
 use crate::rings::{NODES, ROW, Ring, TERMS, chebyshev, hat_position, node};
+use crate::rows::{Row, Rows};
 
 /// Samples on the smallest ring: one for each sub-pixel point.
 const LEAST_SAMPLES: f64 = SUBSAMPLES as f64;
 /// Width of a look-up in units of the distance between samples: neighbours overlap, so that a small bright lamp between
 /// them is missed by neither.
 const OVERLAP: f64 = 1.3;
-/// Range of angles of view, in radians, that one angle stands for: two steps of the table of lobes.
-const NARROW: f64 = 0.05;
-/// Sub-pixel points that share an angle of view in pixels with a wider range.
-const GROUP: usize = 4;
-
+/// Largest difference of the angles of view in a bundle, in radians; angles are rounded to multiples of it, so that
+/// neighbouring bundles share coefficients.
+const ANGLE_STEP: f64 = 1e-3;
 /// Rings sampled between two nodes. The outer intervals (θ_h above 0.3) have the longest rings by far and matter to wide
 /// lobes alone: 2 there cost a third less in all, and at most 15 % more distance from the direct integral at α ≥ 0.4.
 fn strata(interval: usize) -> usize {
     if interval < NODES / 2 { 3 } else { 2 }
 }
 
-/// The light of one pixel, by angle of view.
+/// The light that reaches all subject pixels, in the basis of the rings.
 #[derive(Clone, Debug)]
-pub(crate) struct PixelLight {
-    main: ViewLight,
-    /// Further angles, where one angle cannot stand for the whole pixel: along the silhouette.
-    more: Box<[ViewLight]>,
+pub(crate) struct Transport {
+    /// The rows of [`Rows::main`], in their order.
+    main: Vec<Bundle>,
+    /// Those of [`Rows::more`].
+    more: Vec<Bundle>,
+    /// For each row of `more`, the place of its pixel in `main`.
+    places: Vec<u32>,
 }
 
-/// The light of the sub-pixel points that are seen under about the same angle: the moments of each channel.
+/// Rows of about the same angle of view, one in each lane.
 #[derive(Clone, Debug)]
-struct ViewLight {
-    moments: [[f32; ROW]; 3],
-    angle: AnglePosition,
+struct Bundle {
+    theta: f64,
+    /// Lanes in use.
+    len: usize,
+    moments: Box<Moments>,
 }
 
-impl PixelLight {
-    /// Gathers the light of a pixel; the mean over all of its sub-pixel samples, those that miss the subject being 0.
-    pub(crate) fn gather(field: &Field, film: &Film, pixel: usize) -> Self {
-        let mut views: Vec<View> =
-            film.subject_points(&field.bodies, pixel, SUBSAMPLES).into_iter().map(View::new).collect();
-        let angles =
-            |v: &[View]| v.iter().map(View::angle).fold((PI, 0.0f64), |(a, b), t| (a.min(t), b.max(t)));
-        let (least, most) = angles(&views);
-        if most - least <= NARROW {
-            return Self { main: ViewLight::gather(field, &views), more: Box::default() };
+/// Bundles that are worked on by one thread without a break.
+const BLOCK: usize = 32;
+
+impl Transport {
+    /// Gathers the light of all rows.
+    pub(crate) fn gather(field: &Field, film: &Film, rows: &Rows) -> Self {
+        let gather = |rows: &[Row]| -> Vec<Bundle> {
+            bundled(rows).into_par_iter().map(|rows| Bundle::gather(field, film, rows)).collect()
+        };
+        let place: HashMap<u32, u32> = rows.main.iter().zip(0..).map(|(row, k)| (row.pixel, k)).collect();
+        Self {
+            main: gather(&rows.main),
+            more: gather(&rows.more),
+            places: rows.more.iter().map(|row| place[&row.pixel]).collect(),
         }
-        views.sort_by(|a, b| a.angle().total_cmp(&b.angle()));
-        let mut lights = views.chunks(GROUP).map(|group| ViewLight::gather(field, group));
-        let main = lights.next().unwrap_or_else(|| ViewLight::gather(field, &[]));
-        Self { main, more: lights.collect() }
     }
 
-    /// Adds the radiance towards the eye through each of some lobes.
-    pub(crate) fn add_radiance(&self, lobes: &[LobeTable], sums: &mut [Rgb]) {
-        add_radiance(&self.main, lobes, sums);
-        self.more.iter().for_each(|light| add_radiance(light, lobes, sums));
+    /// The radiance of all rows' pixels through some lobes: for each lobe three planes, one for each channel.
+    pub(crate) fn radiance(&self, lobes: &[LobeTable]) -> Vec<[Vec<f32>; 3]> {
+        let mut images = planes(&self.main, lobes);
+        let more = planes(&self.more, lobes);
+        images.par_iter_mut().zip(more).for_each(|(image, more)| {
+            for c in 0..3 {
+                self.places.iter().zip(&more[c]).for_each(|(place, v)| image[c][*place as usize] += v);
+            }
+        });
+        images
     }
 }
 
-impl ViewLight {
-    /// Gathers the light of some of the [`SUBSAMPLES`] points of a pixel.
-    fn gather(field: &Field, points: &[View]) -> Self {
-        let coverage = points.len() as f64 / f64::from(SUBSAMPLES);
-        let spread = normal_spread(points);
-        let mut sums = [[Rgb::ZERO; TERMS]; NODES];
-        for interval in 0..NODES - 1 {
-            let width = node(interval + 1) - node(interval);
-            let strata = strata(interval);
-            for stratum in 0..strata {
-                let count = interval * 3 + stratum;
-                let hat = (stratum as f64 + 0.5) / strata as f64;
-                let ring = RingSamples {
-                    theta: node(interval) + hat * width,
-                    step: width / strata as f64,
-                    count,
-                    spread,
-                };
-                let moments = ring.moments(field, points);
-                for k in 0..TERMS {
-                    sums[interval][k] += moments[k] * ((1.0 - hat) * coverage) as f32;
-                    sums[interval + 1][k] += moments[k] * (hat * coverage) as f32;
-                }
+/// Sorted rows in runs of at most [`LANES`] that are seen under about the same angle.
+fn bundled(rows: &[Row]) -> Vec<&[Row]> {
+    let mut bundles = Vec::new();
+    let mut rest = rows;
+    while let Some(first) = rest.first() {
+        let near = |row: &&Row| row.theta - first.theta <= ANGLE_STEP;
+        let (bundle, after) = rest.split_at(rest.iter().take(LANES).take_while(near).count());
+        bundles.push(bundle);
+        rest = after;
+    }
+    bundles
+}
+
+/// The products of all bundles with all lobes.
+fn planes(bundles: &[Bundle], lobes: &[LobeTable]) -> Vec<[Vec<f32>; 3]> {
+    let blocks: Vec<Vec<[Lanes; 3]>> =
+        bundles.par_chunks(BLOCK).map(|bundles| block(bundles, lobes)).collect();
+    let plane = |m: usize, c: usize| -> Vec<f32> {
+        let products = blocks.iter().flat_map(|block| block.iter().skip(m).step_by(lobes.len()));
+        let mut plane = Vec::with_capacity(bundles.len() * LANES);
+        bundles.iter().zip(products).for_each(|(b, p)| plane.extend_from_slice(&p[c][..b.len]));
+        plane
+    };
+    (0..lobes.len()).into_par_iter().map(|m| std::array::from_fn(|c| plane(m, c))).collect()
+}
+
+/// The products of some bundles with all lobes, lobe by lobe for each bundle.
+fn block(bundles: &[Bundle], lobes: &[LobeTable]) -> Vec<[Lanes; 3]> {
+    let mut products = vec![[[0.0; LANES]; 3]; bundles.len() * lobes.len()];
+    let mut coefficients = Vec::new();
+    let mut theta = f64::NAN;
+    for (bundle, out) in bundles.iter().zip(products.chunks_mut(lobes.len().max(1))) {
+        if bundle.theta != theta {
+            theta = bundle.theta;
+            coefficients.clear();
+            coefficients.extend(lobes.iter().map(|lobe| lobe.at(theta)));
+        }
+        product::products(&bundle.moments, &coefficients, out);
+    }
+    products
+}
+
+impl Bundle {
+    fn gather(field: &Field, film: &Film, rows: &[Row]) -> Self {
+        let mut moments = Box::new([[[0.0; LANES]; 3]; ROW]);
+        for (lane, row) in rows.iter().enumerate() {
+            let sums = gather_row(field, &row.views(field, film));
+            for (i, sum) in sums.as_flattened().iter().enumerate() {
+                (0..3).for_each(|c| moments[i][c][lane] = sum[c]);
             }
         }
-        add_lamps(field, points, &mut sums);
-        let moments = std::array::from_fn(|c| std::array::from_fn(|i| sums[i / TERMS][i % TERMS][c]));
-        let theta = points.iter().map(View::angle).sum::<f64>() / points.len().max(1) as f64;
-        Self { moments, angle: AnglePosition::new(theta) }
+        let mean = rows.iter().map(|row| row.theta).sum::<f64>() / rows.len() as f64;
+        Self { theta: (mean / ANGLE_STEP).round() * ANGLE_STEP, len: rows.len(), moments }
     }
+}
+
+/// The moments of some of the [`SUBSAMPLES`] points of a pixel.
+fn gather_row(field: &Field, points: &[View]) -> [[Rgb; TERMS]; NODES] {
+    let coverage = points.len() as f64 / f64::from(SUBSAMPLES);
+    let spread = normal_spread(points);
+    let mut sums = [[Rgb::ZERO; TERMS]; NODES];
+    for interval in 0..NODES - 1 {
+        let width = node(interval + 1) - node(interval);
+        let strata = strata(interval);
+        for stratum in 0..strata {
+            let count = interval * 3 + stratum;
+            let hat = (stratum as f64 + 0.5) / strata as f64;
+            let ring = RingSamples {
+                theta: node(interval) + hat * width,
+                step: width / strata as f64,
+                count,
+                spread,
+            };
+            let moments = ring.moments(field, points);
+            for k in 0..TERMS {
+                sums[interval][k] += moments[k] * ((1.0 - hat) * coverage) as f32;
+                sums[interval + 1][k] += moments[k] * (hat * coverage) as f32;
+            }
+        }
+    }
+    add_lamps(field, points, &mut sums);
+    sums
 }
 
 /// Adds the environment's lamps, each a single direction, but for those that are evaluated as highlights: `dω_i = 4 cos_d sin θ_h dθ_h dφ_h` turns its irradiance into
@@ -122,13 +185,8 @@ fn add_lamps(field: &Field, points: &[View], sums: &mut [[Rgb; TERMS]; NODES]) {
     }
 }
 
-/// The light of all subject pixels, in their order.
-pub(crate) fn gather_all(field: &Field, film: &Film, subjects: &[u32]) -> Vec<PixelLight> {
-    subjects.par_iter().map(|pixel| PixelLight::gather(field, film, *pixel as usize)).collect()
-}
-
 /// A sub-pixel point with its frame.
-struct View {
+pub(crate) struct View {
     point: SurfacePoint,
     frame: [DVec3; 3],
     cosine: f64,
@@ -136,13 +194,13 @@ struct View {
 }
 
 impl View {
-    fn new(point: SurfacePoint) -> Self {
+    pub(crate) fn new(point: SurfacePoint) -> Self {
         let cosine = point.wo.dot(point.place.normal).clamp(1e-6, 1.0);
         Self { point, frame: point.view_frame(), cosine, sine: (1.0 - cosine * cosine).sqrt() }
     }
 
     /// Angle of view in radians.
-    fn angle(&self) -> f64 {
+    pub(crate) fn angle(&self) -> f64 {
         self.cosine.acos()
     }
 }
@@ -219,63 +277,4 @@ fn normal_spread(points: &[View]) -> f64 {
     // A square of side s has a variance of s²/6; its mirror image is twice as wide and shared by n samples. Half of that
     // width: a wider filter blurs small pictures more than the points alias.
     ((6.0 * variance).sqrt() / n.sqrt()).min(PI / 16.0)
-}
-
-/// Lanes of the sums: a fixed number, so that all instruction sets add in the same order.
-const LANES: usize = 8;
-const _: () = assert!(ROW.is_multiple_of(LANES));
-
-/// Adds `Σ c_jk J_jk` of one view of a pixel for each lobe: the moments stay in the first cache while the lobes pass by.
-fn add_radiance(light: &ViewLight, lobes: &[LobeTable], sums: &mut [Rgb]) {
-    for (lobe, sum) in lobes.iter().zip(sums) {
-        let [red, green, blue] = &light.moments;
-        let [r, g, b] = if lobe.is_grey() {
-            let (low, high, t) = lobe.rows(0, light.angle);
-            blended_dots(low, high, t, [red, green, blue])
-        } else {
-            std::array::from_fn(|c| {
-                let (low, high, t) = lobe.rows(c, light.angle);
-                blended_dots(low, high, t, [&light.moments[c]])[0]
-            })
-        };
-        *sum += Rgb::new(r, g, b, 0.0);
-    }
-}
-
-/// `Σ (a + t (b − a)) m` for each of some moments.
-fn blended_dots<const N: usize>(
-    a: &[f32; ROW],
-    b: &[f32; ROW],
-    t: f32,
-    moments: [&[f32; ROW]; N],
-) -> [f32; N] {
-    let mut coefficients = [0.0; ROW];
-    blend(a, b, t, &mut coefficients);
-    moments.map(|m| dot(&coefficients, m))
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn blend(a: &[f32; ROW], b: &[f32; ROW], t: f32, out: &mut [f32; ROW]) {
-    for i in 0..ROW {
-        out[i] = a[i] + t * (b[i] - a[i]);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn dot(a: &[f32; ROW], b: &[f32; ROW]) -> f32 {
-    let mut sums = [0.0f32; LANES];
-    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
-        for l in 0..LANES {
-            sums[l] += a[l] * b[l];
-        }
-    }
-    // Hides from the optimiser how the lanes are added up: it would split them into pairs from the start.
-    let sums = std::hint::black_box(sums);
-    total(&sums)
-}
-
-/// The sum of all lanes, in pairs: a chain of additions would take longer than all that comes before it.
-#[inline(always)]
-fn total(l: &[f32; LANES]) -> f32 {
-    ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]))
 }

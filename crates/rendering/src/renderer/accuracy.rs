@@ -34,10 +34,13 @@ fn distance(renderer: &Renderer, material: &Material, a: &[[f32; 3]], b: &[[f32;
 fn thinned(scene: &Scene, illumination: Illumination) -> Renderer {
     let renderer = Renderer::prepare(scene, illumination, SIZE).unwrap();
     let Renderer { field, film, .. } = &renderer;
-    let subjects: Vec<u32> = renderer.subjects.iter().copied().step_by(STEP).collect();
+    let mut pixels = renderer.subjects.clone();
+    pixels.sort();
+    let rows = Rows::new(field, film, &pixels.into_iter().step_by(STEP).collect::<Vec<_>>());
+    let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
     let diffuse = subjects.iter().map(|p| diffuse_light(scene, field, film, *p as usize)).collect();
     let highlights = Highlights::prepare(field, film, &subjects);
-    Renderer { subjects, diffuse, highlights, ..renderer }.keep_transport()
+    Renderer { subjects, rows, diffuse, highlights, ..renderer }.keep_transport()
 }
 
 /// Prints and checks the distances of materials, each with the most that is accepted.
@@ -111,3 +114,34 @@ fn shipped_samples_of_anisotropic_lobes_suffice() {
         assert!(found.iter().zip(most).all(|(f, m)| *f <= m), "{text}: {found:?}, accepted {most:?}");
     }
 }
+
+#[test]
+fn dump() {
+    let Ok(path) = std::env::var("DUMP") else { return };
+    let renderer = thinned(&Scene::reference(), Illumination::Environment);
+    let mut order: Vec<usize> = (0..renderer.subjects.len()).collect();
+    order.sort_by_key(|k| renderer.subjects[*k]);
+    let mut out = Vec::new();
+    for text in MATS {
+        let material = Material::parse(text).unwrap();
+        let s = renderer.specular_pixels(&*material.bsdf());
+        let d = renderer.diffuse_pixels(&material);
+        for k in &order {
+            for c in 0..3 {
+                out.extend((s[*k][c] + d[*k][c]).to_le_bytes());
+            }
+        }
+    }
+    std::fs::write(path, out).unwrap();
+}
+const MATS: [&str; 9] = [
+    "ggx:roughness=0.01",
+    "ggx:roughness=0.05",
+    "ggx:roughness=0.5",
+    "ward:roughness=0.1",
+    "as:roughness=0.1",
+    "ggx-conductor:roughness=0.01",
+    "ggx-conductor:roughness=0.05",
+    "ggx-conductor:roughness=0.2",
+    "ggx-conductor:roughness=0.6",
+];

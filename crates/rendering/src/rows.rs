@@ -1,0 +1,81 @@
+//! The rows of the ring transport: which sub-pixel points share one, and in which order rows are kept.
+
+use crate::field::Field;
+use crate::film::{Film, SUBSAMPLES};
+use crate::transport::View;
+
+/// Range of angles of view, in radians, that one row stands for.
+const NARROW: f64 = 0.05;
+/// Sub-pixel points that share a row in pixels with a wider range.
+const GROUP: usize = 4;
+
+/// The sub-pixel points of one pixel that are seen under about the same angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) pixel: u32,
+    /// Which of the pixel's rows.
+    part: u32,
+    /// Mean angle of view, in radians.
+    pub(crate) theta: f64,
+}
+
+/// The rows of a picture: the first of every subject pixel, then those that some pixels have more; each part sorted by
+/// angle.
+#[derive(Clone, Debug)]
+pub(crate) struct Rows {
+    /// One for each subject pixel.
+    pub(crate) main: Vec<Row>,
+    /// The others.
+    pub(crate) more: Vec<Row>,
+}
+
+impl Rows {
+    pub(crate) fn new(field: &Field, film: &Film, pixels: &[u32]) -> Self {
+        use rayon::prelude::*;
+        let of_pixel = |pixel: &u32| -> Vec<Row> {
+            let parts = parts(field, film, *pixel);
+            let row = |(part, views): (usize, &Vec<View>)| Row {
+                pixel: *pixel,
+                part: part as u32,
+                theta: mean_angle(views),
+            };
+            parts.iter().enumerate().map(row).collect()
+        };
+        let rows: Vec<Vec<Row>> = pixels.par_iter().map(of_pixel).collect();
+        let (mut main, mut more): (Vec<Row>, Vec<Row>) =
+            rows.into_iter().flatten().partition(|row| row.part == 0);
+        let by_angle =
+            |a: &Row, b: &Row| a.theta.total_cmp(&b.theta).then((a.pixel, a.part).cmp(&(b.pixel, b.part)));
+        main.sort_by(by_angle);
+        more.sort_by(by_angle);
+        Self { main, more }
+    }
+}
+
+impl Row {
+    /// The points that the row stands for.
+    pub(crate) fn views(&self, field: &Field, film: &Film) -> Vec<View> {
+        parts(field, film, self.pixel).swap_remove(self.part as usize)
+    }
+}
+
+/// The points of a pixel, in the groups that share a row.
+fn parts(field: &Field, film: &Film, pixel: u32) -> Vec<Vec<View>> {
+    let mut views: Vec<View> =
+        film.subject_points(&field.bodies, pixel as usize, SUBSAMPLES).into_iter().map(View::new).collect();
+    let angles = || views.iter().map(View::angle);
+    let (least, most) = (angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max));
+    if most - least <= NARROW {
+        return vec![views];
+    }
+    views.sort_by(|a, b| a.angle().total_cmp(&b.angle()));
+    let mut parts = Vec::new();
+    while !views.is_empty() {
+        parts.push(views.drain(..GROUP.min(views.len())).collect());
+    }
+    parts
+}
+
+fn mean_angle(views: &[View]) -> f64 {
+    views.iter().map(View::angle).sum::<f64>() / views.len().max(1) as f64
+}
