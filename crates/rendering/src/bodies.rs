@@ -27,6 +27,16 @@ impl Bodies {
         }
     }
 
+    /// Centre and radius of each sphere.
+    pub(crate) fn spheres(&self) -> &[(DVec3, f64)] {
+        &self.spheres
+    }
+
+    /// Height and half extent of the checkerboard.
+    pub(crate) fn plane(&self) -> Option<(f64, f64)> {
+        self.plane
+    }
+
     /// The first body on a ray from `origin` along the unit vector `direction`, with its distance. A ray that starts on
     /// `from` does not see it: both kinds of bodies are convex.
     // Inlined: a direction just computed and handed over in memory stalls the ring transport (a quarter of its time).

@@ -30,11 +30,11 @@ pub struct EnvironmentMap {
     /// The map as it is.
     pyramid: Pyramid,
     /// The map without what its lamps exceed the limit by: free of peaks that fall between samples.
-    dimmed: Pyramid,
+    pub(crate) dimmed: Pyramid,
     /// Direction of each lamp and its irradiance on a surface that faces it: what `dimmed` lacks.
     pub(crate) lamps: Vec<(DVec3, Rgb)>,
     /// Rotation in turns.
-    rotation: f32,
+    pub(crate) rotation: f32,
     /// Directions, each with its irradiance on a surface that faces it: all of the map's light.
     pub(crate) lights: Vec<(DVec3, Rgb)>,
 }

@@ -22,8 +22,8 @@ const SPHERE_ROWS: usize = 48;
 pub(crate) struct Field {
     pub(crate) bodies: Bodies,
     pub(crate) points: Vec<(DVec3, Rgb)>,
-    environment: Option<EnvironmentMap>,
-    board: Option<Board>,
+    pub(crate) environment: Option<EnvironmentMap>,
+    pub(crate) board: Option<Board>,
     /// Diffuse radiance of the spheres that have a colour of their own, by direction from the centre.
     spheres: Vec<Option<Pyramid>>,
 }
@@ -116,7 +116,7 @@ impl Field {
             Body::Plane => {
                 // The footprint is stretched along the ray at grazing angles; a square of equal area stands for it.
                 let width = angle * distance / direction.y.abs().sqrt().max(0.05);
-                self.board.as_ref().map_or(Rgb::ZERO, |b| b.radiance(point, width))
+                self.board.as_ref().map_or(Rgb::ZERO, |b| b.radiance_over(point, width))
             }
             Body::Sphere(k) => self.spheres[k].as_ref().map_or(Rgb::ZERO, |texture| {
                 let (u, v) = map_position(self.bodies.normal(k, point));

@@ -11,12 +11,14 @@
 //! one sphere seen in another. `docs/engine.md` has the measured size of both.
 
 mod angles;
+mod arcs;
 mod bodies;
 mod designed_map;
 mod environment;
 mod error;
 mod field;
 mod film;
+mod functions;
 mod gather;
 mod highlights;
 mod irradiance;

@@ -21,8 +21,8 @@ pub(crate) struct Board {
     albedo: [Rgb; 2],
     /// Irradiance that varies smoothly: everything but the point lights.
     smooth: Pyramid,
-    /// Outgoing radiance, all lights.
-    radiance: Pyramid,
+    /// Outgoing radiance, all lights; beside it, in the fourth lane, the luminance of the albedo over π.
+    pub(crate) radiance: Pyramid,
 }
 
 impl Board {
@@ -44,7 +44,9 @@ impl Board {
         let quarter = |sx: f64, sz: f64| DVec3::new(sx * step / 4.0, 0.0, sz * step / 4.0);
         let corners = [quarter(-1.0, -1.0), quarter(1.0, -1.0), quarter(-1.0, 1.0), quarter(1.0, 1.0)];
         board.radiance = tabulate(plane, TEXELS, |p| {
-            corners.iter().map(|c| board.exact(p + *c, sharp(p + *c))).sum::<Rgb>() / 4.0
+            let corner =
+                |c: &DVec3| board.exact(p + *c, sharp(p + *c)).truncate().extend(board.brightness_at(p + *c));
+            corners.iter().map(corner).sum::<Rgb>() / 4.0
         });
         board
     }
@@ -56,10 +58,21 @@ impl Board {
     }
 
     /// Radiance averaged over a footprint of `width` metres.
-    pub(crate) fn radiance(&self, point: DVec3, width: f64) -> Rgb {
+    pub(crate) fn radiance_over(&self, point: DVec3, width: f64) -> Rgb {
         let (u, v) = self.position(point);
         let texels = width * TEXELS as f64 / (2.0 * self.plane.half_extent);
         self.radiance.sample(u, v, texels as f32)
+    }
+
+    /// Texels of the finest level of [`Board::radiance`] along each side.
+    pub(crate) fn texels(&self) -> usize {
+        TEXELS
+    }
+
+    /// Luminance of the albedo over π.
+    fn brightness_at(&self, point: DVec3) -> f32 {
+        let [r, g, b, _] = self.albedo_at(point).to_array();
+        lookmatch_imaging::luminance([r, g, b]) / PI
     }
 
     fn albedo_at(&self, point: DVec3) -> Rgb {

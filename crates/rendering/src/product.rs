@@ -4,8 +4,7 @@
 //! moment that is loaded. Compiled for AVX-512, AVX2 and the baseline, and chosen at run time. The order of additions is the
 //! same in all of them; the last rounds each product before it is added, which leaves a relative difference of 1e-6.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
+use fearless_simd::{Level, dispatch, prelude::*};
 
 use crate::lobe_table::Coefficients;
 use crate::rings::ROW;
@@ -21,55 +20,104 @@ pub(crate) type Moments = [[Lanes; 3]; ROW];
 
 /// For each lobe and channel, `Σ_i c_i J_i` of each row.
 pub(crate) fn products(moments: &Moments, lobes: &[Coefficients], out: &mut [[Lanes; 3]]) {
-    assert_eq!(lobes.len(), out.len(), "one result for each lobe");
-    dispatched(moments, lobes, out);
+    products_at(Level::new(), moments, lobes, out);
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-fn dispatched(moments: &Moments, lobes: &[Coefficients], out: &mut [[Lanes; 3]]) {
-    // As many sums as fit the registers.
-    if target_cfg_f!(target_feature = "avx512f") {
-        tiled::<8, true>(moments, lobes, out);
-    } else if target_cfg_f!(target_feature = "fma") {
-        tiled::<2, true>(moments, lobes, out);
+fn products_at(level: Level, moments: &Moments, lobes: &[Coefficients], out: &mut [[Lanes; 3]]) {
+    assert_eq!(lobes.len(), out.len(), "one result for each lobe");
+    dispatch!(level, simd => tiled(simd, moments, lobes, out));
+}
+
+/// Takes as many lobes at once as the registers hold sums for.
+#[inline(always)]
+fn tiled<S: Simd>(simd: S, moments: &Moments, lobes: &[Coefficients], out: &mut [[Lanes; 3]]) {
+    if S::f32s::LEN == LANES {
+        tiles::<S, 8>(simd, moments, lobes, out)
     } else {
-        tiled::<1, false>(moments, lobes, out);
+        tiles::<S, 4>(simd, moments, lobes, out)
     }
 }
 
 #[inline(always)]
-fn tiled<const TILE: usize, const FUSED: bool>(
+fn tiles<S: Simd, const TILE: usize>(
+    simd: S,
     moments: &Moments,
     lobes: &[Coefficients],
     out: &mut [[Lanes; 3]],
 ) {
-    let (tiles, rest) = lobes.as_chunks::<TILE>();
-    let (out_tiles, out_rest) = out.as_chunks_mut::<TILE>();
-    for (lobes, out) in tiles.iter().zip(out_tiles) {
-        *out = tile::<TILE, FUSED>(moments, lobes);
+    let (whole, rest) = lobes.as_chunks::<TILE>();
+    let (out_whole, out_rest) = out.as_chunks_mut::<TILE>();
+    for (lobes, out) in whole.iter().zip(out_whole) {
+        tile(simd, moments, lobes, out);
     }
     for (lobe, out) in rest.iter().zip(out_rest) {
-        *out = tile::<1, FUSED>(moments, std::array::from_ref(lobe))[0];
+        tile(simd, moments, std::array::from_ref(lobe), std::array::from_mut(out));
     }
 }
 
 #[inline(always)]
-fn tile<const TILE: usize, const FUSED: bool>(
+fn tile<S: Simd, const TILE: usize>(
+    simd: S,
     moments: &Moments,
     lobes: &[Coefficients; TILE],
-) -> [[Lanes; 3]; TILE] {
-    let mut sums = [[[0.0; LANES]; 3]; TILE];
-    for i in 0..ROW {
-        for t in 0..TILE {
+    out: &mut [[Lanes; 3]; TILE],
+) {
+    let width = S::f32s::LEN.min(LANES);
+    for first in (0..LANES).step_by(width) {
+        let lanes = first..first + width;
+        let mut sums = [[S::f32s::splat(simd, 0.0); 3]; TILE];
+        for i in 0..ROW {
             for c in 0..3 {
-                let coefficient = lobes[t][i][c];
-                for l in 0..LANES {
-                    let (sum, moment) = (&mut sums[t][c][l], moments[i][c][l]);
-                    *sum =
-                        if FUSED { coefficient.mul_add(moment, *sum) } else { *sum + coefficient * moment };
+                let moment = S::f32s::from_slice(simd, &moments[i][c][lanes.clone()]);
+                for t in 0..TILE {
+                    sums[t][c] = S::f32s::splat(simd, lobes[t][i][c]).mul_add(moment, sums[t][c]);
                 }
             }
         }
+        for t in 0..TILE {
+            (0..3).for_each(|c| sums[t][c].store_slice(&mut out[t][c][lanes.clone()]));
+        }
     }
-    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn instruction_sets_agree() {
+        let value = |i: usize| ((i * 7919 % 1000) as f32 / 500.0 - 1.0).powi(3);
+        let moments: Moments = std::array::from_fn(|i| {
+            std::array::from_fn(|c| std::array::from_fn(|l| value(i * 48 + c * 16 + l) + 1.0))
+        });
+        let lobe = |m: usize| std::array::from_fn(|i| std::array::from_fn(|c| value(m * 999 + i * 3 + c)));
+        let lobes: Vec<Coefficients> = (0..11).map(lobe).collect();
+        let size: f32 = (0..ROW).map(|i| (lobes[0][i][0] * moments[i][0][0]).abs()).sum();
+        let at = |level: Level| {
+            let mut out = vec![[[0.0; LANES]; 3]; lobes.len()];
+            products_at(level, &moments, &lobes, &mut out);
+            out
+        };
+        let best = at(Level::new());
+        for level in levels() {
+            for (a, b) in
+                best.as_flattened().as_flattened().iter().zip(at(level).as_flattened().as_flattened())
+            {
+                assert!((a - b).abs() < 1e-6 * size, "{level:?}: {a} {b}");
+            }
+        }
+        let exact = |m: usize, c: usize, l: usize| -> f64 {
+            (0..ROW).map(|i| f64::from(lobes[m][i][c]) * f64::from(moments[i][c][l])).sum()
+        };
+        assert!((f64::from(best[9][2][5]) - exact(9, 2, 5)).abs() < 1e-6 * f64::from(size));
+    }
+
+    /// Every instruction set of this processor.
+    fn levels() -> Vec<Level> {
+        let level = Level::new();
+        let mut levels = vec![Level::baseline()];
+        levels.extend(level.as_avx2().map(Level::Avx2));
+        levels.push(level);
+        levels
+    }
 }

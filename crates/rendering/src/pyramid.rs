@@ -38,6 +38,12 @@ impl Pyramid {
         self.levels[0].height
     }
 
+    /// Bilinear look-up at `u, v` in `[0, 1]` in one level, or the coarsest.
+    #[inline(always)]
+    pub(crate) fn at_level(&self, u: f32, v: f32, level: u32) -> Rgb {
+        self.levels[(level as usize).min(self.levels.len() - 1)].bilinear(u, v, self.wraps)
+    }
+
     /// Trilinear look-up at `u, v` in `[0, 1]` for a footprint of `texels` texels of the finest level.
     pub(crate) fn sample(&self, u: f32, v: f32, texels: f32) -> Rgb {
         let level = texels.max(1.0).log2().min((self.levels.len() - 1) as f32);
@@ -51,6 +57,7 @@ impl Pyramid {
 }
 
 impl Level {
+    #[inline(always)]
     fn bilinear(&self, u: f32, v: f32, wraps: bool) -> Rgb {
         let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
         // Rounding down: the positions are -0.5 or more, and truncation, unlike `floor`, is one instruction.

@@ -1,8 +1,30 @@
 //! The rows of the ring transport: which sub-pixel points share one, and in which order rows are kept.
 
+use glam::DVec3;
+
 use crate::field::Field;
-use crate::film::{Film, SUBSAMPLES};
-use crate::transport::View;
+use crate::film::{Film, SUBSAMPLES, SurfacePoint};
+
+/// A sub-pixel point with the frame whose tangent lies in the plane of its view.
+pub(crate) struct View {
+    pub(crate) point: SurfacePoint,
+    pub(crate) frame: [DVec3; 3],
+    /// Of the angle of view.
+    pub(crate) cosine: f64,
+    pub(crate) sine: f64,
+}
+
+impl View {
+    pub(crate) fn new(point: SurfacePoint) -> Self {
+        let cosine = point.wo.dot(point.place.normal).clamp(1e-6, 1.0);
+        Self { point, frame: point.view_frame(), cosine, sine: (1.0 - cosine * cosine).sqrt() }
+    }
+
+    /// Angle of view in radians.
+    pub(crate) fn angle(&self) -> f64 {
+        self.cosine.acos()
+    }
+}
 
 /// Range of angles of view, in radians, that one row stands for.
 const NARROW: f64 = 0.05;

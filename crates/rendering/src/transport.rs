@@ -1,33 +1,27 @@
 //! Ring transport: the light of every pixel in the basis of the rings. See [`crate::rings`].
 
 use std::collections::HashMap;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::Rgb;
+use crate::arcs::{self, Density};
 use crate::field::Field;
-use crate::film::{Film, SUBSAMPLES, SurfacePoint, to_world};
+use crate::film::{Film, SUBSAMPLES};
 use crate::highlights::is_near_lamp;
 use crate::lobe_table::LobeTable;
 use crate::product::{self, LANES, Lanes, Moments};
-use crate::rings::{NODES, ROW, Ring, TERMS, chebyshev, hat_position, node};
-use crate::rows::{Row, Rows};
+use crate::rings::{ROW, Ring, chebyshev, hat_position};
+use crate::rows::{Row, Rows, View};
 
-/// Samples on the smallest ring: one for each sub-pixel point.
-const LEAST_SAMPLES: f64 = SUBSAMPLES as f64;
-/// Width of a look-up in units of the distance between samples: neighbours overlap, so that a small bright lamp between
-/// them is missed by neither.
-const OVERLAP: f64 = 1.3;
 /// Largest difference of the angles of view in a bundle, in radians; angles are rounded to multiples of it, so that
 /// neighbouring bundles share coefficients.
 const ANGLE_STEP: f64 = 1e-3;
-/// Rings sampled between two nodes. The outer intervals (θ_h above 0.3) have the longest rings by far and matter to wide
-/// lobes alone: 2 there cost a third less in all, and at most 15 % more distance from the direct integral at α ≥ 0.4.
-fn strata(interval: usize) -> usize {
-    if interval < NODES / 2 { 3 } else { 2 }
-}
+
+/// Rings sampled between two nodes.
+const STRATA: usize = 8;
 
 /// The light that reaches all subject pixels, in the basis of the rings.
 #[derive(Clone, Debug)]
@@ -136,36 +130,18 @@ impl Bundle {
 }
 
 /// The moments of some of the [`SUBSAMPLES`] points of a pixel.
-fn gather_row(field: &Field, points: &[View]) -> [[Rgb; TERMS]; NODES] {
-    let coverage = points.len() as f64 / f64::from(SUBSAMPLES);
-    let spread = normal_spread(points);
-    let mut sums = [[Rgb::ZERO; TERMS]; NODES];
-    for interval in 0..NODES - 1 {
-        let width = node(interval + 1) - node(interval);
-        let strata = strata(interval);
-        for stratum in 0..strata {
-            let count = interval * 3 + stratum;
-            let hat = (stratum as f64 + 0.5) / strata as f64;
-            let ring = RingSamples {
-                theta: node(interval) + hat * width,
-                step: width / strata as f64,
-                count,
-                spread,
-            };
-            let moments = ring.moments(field, points);
-            for k in 0..TERMS {
-                sums[interval][k] += moments[k] * ((1.0 - hat) * coverage) as f32;
-                sums[interval + 1][k] += moments[k] * (hat * coverage) as f32;
-            }
-        }
-    }
-    add_lamps(field, points, &mut sums);
-    sums
+fn gather_row(field: &Field, points: &[View]) -> arcs::Moments {
+    let density = Density { strata: STRATA, spread: normal_spread(points) as f32 };
+    let mut moments = arcs::moments(field, points, density);
+    let coverage = points.len() as f32 / SUBSAMPLES as f32;
+    moments.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|m| *m *= coverage);
+    add_lamps(field, points, &mut moments);
+    moments
 }
 
 /// Adds the environment's lamps, each a single direction, but for those that are evaluated as highlights: `dω_i = 4 cos_d sin θ_h dθ_h dφ_h` turns its irradiance into
 /// moments.
-fn add_lamps(field: &Field, points: &[View], sums: &mut [[Rgb; TERMS]; NODES]) {
+fn add_lamps(field: &Field, points: &[View], moments: &mut arcs::Moments) {
     for view in points {
         let far = |(direction, _): &(DVec3, Rgb)| !is_near_lamp(&view.point, *direction);
         for (direction, irradiance) in field.lamps(view.point.place).filter(far) {
@@ -178,92 +154,10 @@ fn add_lamps(field: &Field, points: &[View], sums: &mut [[Rgb; TERMS]; NODES]) {
             let (interval, hat) = hat_position(sin_h.atan2(cos_h));
             for (k, t) in chebyshev(ring.position(cos_d)).into_iter().enumerate() {
                 let moment = irradiance * (t / density) as f32;
-                sums[interval][k] += moment * (1.0 - hat) as f32;
-                sums[interval + 1][k] += moment * hat as f32;
-            }
-        }
-    }
-}
-
-/// A sub-pixel point with its frame.
-pub(crate) struct View {
-    point: SurfacePoint,
-    frame: [DVec3; 3],
-    cosine: f64,
-    sine: f64,
-}
-
-impl View {
-    pub(crate) fn new(point: SurfacePoint) -> Self {
-        let cosine = point.wo.dot(point.place.normal).clamp(1e-6, 1.0);
-        Self { point, frame: point.view_frame(), cosine, sine: (1.0 - cosine * cosine).sqrt() }
-    }
-
-    /// Angle of view in radians.
-    pub(crate) fn angle(&self) -> f64 {
-        self.cosine.acos()
-    }
-}
-
-/// Samples of one ring, dealt out to the sub-pixel points in turn.
-struct RingSamples {
-    theta: f64,
-    /// Range of θ_h that the ring stands for.
-    step: f64,
-    /// Running number of the ring, which decides how samples are dealt out.
-    count: usize,
-    /// Angle between mirrored views of neighbouring sub-pixel points.
-    spread: f64,
-}
-
-impl RingSamples {
-    /// `∫ L T_k(x) dφ_h · step`, averaged over the points.
-    fn moments(&self, field: &Field, points: &[View]) -> [Rgb; TERMS] {
-        let mut sums = [Rgb::ZERO; TERMS];
-        let (sin_h, cos_h) = self.theta.sin_cos();
-        // As far apart along the ring as the rings are from each other.
-        let samples = (TAU * sin_h / self.step).max(LEAST_SAMPLES).round() as usize;
-        // A prime above their number is coprime to it: every ring visits all points, each ring in another order.
-        for first in 0..points.len().min(samples) {
-            let view = &points[(first * 37 + self.count * 3) % points.len()];
-            if let Some(ring) = Ring::new((view.cosine, view.sine), (cos_h, sin_h)) {
-                self.add_samples(field, view, &ring, (first, points.len(), samples), &mut sums);
-            }
-        }
-        sums
-    }
-
-    /// Adds one point's share of the samples of a ring: the `first` and every `stride`-th from it of all `samples`.
-    fn add_samples(
-        &self,
-        field: &Field,
-        view: &View,
-        ring: &Ring,
-        (first, stride, samples): (usize, usize, usize),
-        sums: &mut [Rgb; TERMS],
-    ) {
-        let (sin_h, cos_h) = self.theta.sin_cos();
-        let spacing = 2.0 * ring.half_angle / samples as f64;
-        // The golden ratio keeps neighbouring rings from sampling the same azimuths.
-        let shift = (self.count as f64 * 0.618_033_988_749_895).fract();
-        let weight = (spacing * self.step) as f32;
-        // From sample to sample by rotation, which is cheaper than a sine and a cosine each.
-        let turn = DVec2::from_angle(spacing * stride as f64);
-        let mut azimuth = DVec2::from_angle(spacing * (first as f64 + shift) - ring.half_angle);
-        for _ in (first..samples).step_by(stride) {
-            let (cos_phi, sin_phi) = (azimuth.x, azimuth.y);
-            azimuth = turn.rotate(azimuth);
-            let cos_d = view.cosine * cos_h + view.sine * sin_h * cos_phi;
-            let wi = [
-                2.0 * cos_d * sin_h * cos_phi - view.sine,
-                2.0 * cos_d * sin_h * sin_phi,
-                2.0 * cos_d * cos_h - view.cosine,
-            ];
-            let solid_angle = 4.0 * cos_d * self.step * sin_h * spacing;
-            let angle = (OVERLAP * OVERLAP * solid_angle + self.spread * self.spread).sqrt();
-            let light = field.incident(&view.point.place, to_world(&view.frame, wi), angle) * weight;
-            for (sum, t) in sums.iter_mut().zip(chebyshev(ring.position(cos_d))) {
-                *sum += light * t as f32;
+                for c in 0..3 {
+                    moments[interval][k][c] += moment[c] * (1.0 - hat) as f32;
+                    moments[interval + 1][k][c] += moment[c] * hat as f32;
+                }
             }
         }
     }

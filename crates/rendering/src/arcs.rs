@@ -1,0 +1,440 @@
+//! Gathers the moments of one row: samples on rings of half vectors, sixteen at a time. See [`crate::rings`].
+
+use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
+
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
+use glam::DVec3;
+
+use crate::Rgb;
+use crate::field::Field;
+use crate::functions::{self, Functions};
+use crate::irradiance::Place;
+use crate::product::{LANES, Lanes};
+use crate::rings::{NODES, Ring, TERMS, node};
+use crate::rows::View;
+
+/// Width of a look-up in units of the distance between samples: neighbours overlap, so that a small bright light between
+/// them is missed by neither.
+const OVERLAP: f32 = 1.5;
+/// Terms that are kept of the moments of functions on the checkerboard.
+pub(crate) const FUNCTION_TERMS: usize = 2;
+
+/// Light of a row by basis function: red, green, blue, and what the checkerboard would send if its irradiance were π
+/// everywhere (its albedo's luminance).
+pub(crate) type Moments = [[[f32; 4]; TERMS]; NODES];
+
+/// For some functions on the checkerboard: what it would send if its irradiance were π times the function.
+pub(crate) type FunctionMoments = [[[f32; functions::COUNT]; FUNCTION_TERMS]; NODES];
+
+/// How densely the rings are sampled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Density {
+    /// Rings between two nodes.
+    pub(crate) strata: usize,
+    /// Angle between mirrored views of neighbouring points of the row, in radians.
+    pub(crate) spread: f32,
+}
+
+/// The moments of the light at some points of one row, averaged over them.
+pub(crate) fn moments(field: &Field, points: &[View], density: Density) -> Moments {
+    let mut moments = [[[0.0; 4]; TERMS]; NODES];
+    let level = Level::new();
+    dispatch!(level, simd => Gatherer::new(simd, field, points, density, None).gather(|j, hat, sums, _| {
+        deposit(&mut moments, j, hat, sums);
+    }));
+    moments
+}
+
+/// The same, beside the moments of functions on the checkerboard.
+pub(crate) fn moments_with(
+    field: &Field,
+    functions: &Functions,
+    points: &[View],
+    density: Density,
+) -> (Moments, Box<FunctionMoments>) {
+    let mut moments = [[[0.0; 4]; TERMS]; NODES];
+    let mut of_functions = Box::new([[[0.0; functions::COUNT]; FUNCTION_TERMS]; NODES]);
+    let level = Level::new();
+    dispatch!(level, simd => Gatherer::new(simd, field, points, density, Some(functions)).gather(|j, hat, sums, more| {
+        deposit(&mut moments, j, hat, sums);
+        deposit(&mut of_functions, j, hat, more);
+    }));
+    (moments, of_functions)
+}
+
+/// Adds what was found on a ring to the two hat functions that it lies under.
+#[inline(always)]
+fn deposit<const K: usize, const N: usize>(
+    moments: &mut [[[f32; N]; K]; NODES],
+    interval: usize,
+    hat: f32,
+    sums: &[[f32; N]; K],
+) {
+    for k in 0..K {
+        for c in 0..N {
+            moments[interval][k][c] += sums[k][c] * (1.0 - hat);
+            moments[interval + 1][k][c] += sums[k][c] * hat;
+        }
+    }
+}
+
+/// Three coordinates in lanes.
+#[derive(Clone, Copy)]
+struct Vec3<S: Simd>([f32x16<S>; 3]);
+
+impl<S: Simd> Vec3<S> {
+    #[inline(always)]
+    fn of(simd: S, points: &[View], value: impl Fn(&View) -> DVec3) -> Self {
+        let lane = |axis: usize| {
+            let lanes: Lanes = std::array::from_fn(|l| value(&points[l % points.len()])[axis] as f32);
+            f32x16::load_array(simd, lanes)
+        };
+        Self([lane(0), lane(1), lane(2)])
+    }
+
+    #[inline(always)]
+    fn dot(self, other: Self) -> f32x16<S> {
+        let ([a, b, c], [x, y, z]) = (self.0, other.0);
+        a.mul_add(x, b.mul_add(y, c * z))
+    }
+
+    /// `self + t · direction`
+    #[inline(always)]
+    fn along(self, t: f32x16<S>, direction: Self) -> Self {
+        Self(std::array::from_fn(|k| t.mul_add(direction.0[k], self.0[k])))
+    }
+}
+
+/// The points of a row, one in each lane (fewer of them repeat), and what they see.
+struct Gatherer<'a, S: Simd> {
+    simd: S,
+    field: &'a Field,
+    functions: Option<&'a Functions>,
+    points: &'a [View],
+    density: Density,
+    position: Vec3<S>,
+    frame: [Vec3<S>; 3],
+    cosine: f32x16<S>,
+    sine: f32x16<S>,
+    /// Mean angle of view: the rings are cut for it.
+    mean: (f64, f64),
+}
+
+/// One ring of samples.
+struct Samples {
+    sin_h: f32,
+    cos_h: f32,
+    /// Middle and half of the range of `cos_d`.
+    middle: f32,
+    swing: f32,
+    /// Azimuth of the first sample and distance to the next, in radians.
+    first: f32,
+    spacing: f32,
+    count: usize,
+    /// Range of θ_h that the ring stands for.
+    step: f32,
+    /// Which lane comes first.
+    turn: usize,
+}
+
+impl<'a, S: Simd> Gatherer<'a, S> {
+    #[inline(always)]
+    fn new(
+        simd: S,
+        field: &'a Field,
+        points: &'a [View],
+        density: Density,
+        functions: Option<&'a Functions>,
+    ) -> Self {
+        let theta = points.iter().map(View::angle).sum::<f64>() / points.len() as f64;
+        let number = |value: &dyn Fn(&View) -> f64| {
+            let lanes: Lanes = std::array::from_fn(|l| value(&points[l % points.len()]) as f32);
+            f32x16::load_array(simd, lanes)
+        };
+        Self {
+            simd,
+            field,
+            functions,
+            points,
+            density,
+            position: Vec3::of(simd, points, |v| v.point.place.position),
+            frame: std::array::from_fn(|axis| Vec3::of(simd, points, |v| v.frame[axis])),
+            cosine: number(&|v| v.cosine),
+            sine: number(&|v| v.sine),
+            mean: (theta.cos(), theta.sin()),
+        }
+    }
+
+    /// Walks all rings; hands over, for each, its interval, the share of the right-hand hat function, and its sums.
+    #[inline(always)]
+    fn gather(
+        &mut self,
+        mut found: impl FnMut(usize, f32, &[[f32; 4]; TERMS], &[[f32; functions::COUNT]; FUNCTION_TERMS]),
+    ) {
+        if self.points.is_empty() {
+            return;
+        }
+        for interval in 0..NODES - 1 {
+            for stratum in 0..self.density.strata {
+                let hat = (stratum as f64 + 0.5) / self.density.strata as f64;
+                let Some(samples) = self.ring(interval, stratum, hat) else { continue };
+                let mut more = [[0.0; functions::COUNT]; FUNCTION_TERMS];
+                let sums = self.ring_moments(&samples, &mut more);
+                found(interval, hat as f32, &sums, &more);
+            }
+        }
+    }
+
+    /// The samples of a ring; `None` where it lies below the horizon.
+    #[inline(always)]
+    fn ring(&self, interval: usize, stratum: usize, hat: f64) -> Option<Samples> {
+        let width = node(interval + 1) - node(interval);
+        let (theta, step) = (node(interval) + hat * width, width / self.density.strata as f64);
+        let (sin_h, cos_h) = theta.sin_cos();
+        let ring = Ring::new(self.mean, (cos_h, sin_h))?;
+        let number = interval * self.density.strata + stratum;
+        // As far apart along the ring as the rings are from each other, and at least one for each lane.
+        let wanted = 2.0 * ring.half_angle * sin_h / step;
+        let count = (wanted / LANES as f64).round().max(1.0) as usize * LANES;
+        let spacing = 2.0 * ring.half_angle / count as f64;
+        // The golden ratio keeps neighbouring rings from sampling the same azimuths.
+        let shift = (number as f64 * 0.618_033_988_749_895).fract();
+        let (low, high) = (ring.cos_d(-1.0), ring.cos_d(1.0));
+        Some(Samples {
+            sin_h: sin_h as f32,
+            cos_h: cos_h as f32,
+            middle: ((low + high) / 2.0) as f32,
+            swing: ((high - low) / 2.0).max(1e-9) as f32,
+            first: (shift * spacing - ring.half_angle) as f32,
+            spacing: spacing as f32,
+            count,
+            step: step as f32,
+            turn: 3 * number,
+        })
+    }
+
+    #[inline(always)]
+    fn ring_moments(
+        &self,
+        ring: &Samples,
+        more: &mut [[f32; functions::COUNT]; FUNCTION_TERMS],
+    ) -> [[f32; 4]; TERMS] {
+        let simd = self.simd;
+        let order: Lanes = std::array::from_fn(|l| ((5 * l + ring.turn) % LANES) as f32);
+        let order = f32x16::load_array(simd, order);
+        let mut sums = [[f32x16::splat(simd, 0.0); 4]; TERMS];
+        for start in (0..ring.count).step_by(LANES) {
+            let azimuth = (order + start as f32).mul_add(ring.spacing, ring.first);
+            let (sin_phi, cos_phi) = sin_cos(azimuth);
+            let cos_d = (self.sine * ring.sin_h).mul_add(cos_phi, self.cosine * ring.cos_h);
+            let (along, across) = (cos_d * (2.0 * ring.sin_h), cos_d * (2.0 * ring.cos_h) - self.cosine);
+            let local = [along * cos_phi - self.sine, along * sin_phi, across];
+            let direction = self.to_world(local);
+            let lit = across.simd_gt(0.0) & cos_d.simd_gt(0.0);
+            let solid_angle = cos_d * (4.0 * OVERLAP * OVERLAP * ring.step * ring.sin_h * ring.spacing);
+            let width = (solid_angle.max(0.0) + self.density.spread * self.density.spread).sqrt();
+            let x = ((cos_d - ring.middle) * ring.swing.recip()).max(-1.0).min(1.0);
+            let hits = self.look(direction, width, lit);
+            let light = hits.light.map(|lanes| f32x16::load_array(simd, lanes));
+            let mut polynomials = [f32x16::splat(simd, 1.0); TERMS];
+            polynomials[1] = x;
+            for k in 2..TERMS {
+                polynomials[k] = (x * 2.0).mul_sub(polynomials[k - 1], polynomials[k - 2]);
+            }
+            for (sums, polynomial) in sums.iter_mut().zip(polynomials) {
+                (0..4).for_each(|c| sums[c] = polynomial.mul_add(light[c], sums[c]));
+            }
+            if let Some(functions) = self.functions {
+                add_functions(functions, &hits, &x.to_array(), more);
+            }
+        }
+        let weight = ring.spacing * ring.step;
+        more.iter_mut().flatten().for_each(|sum| *sum *= weight);
+        sums.map(|sums| sums.map(|lanes| lanes.reduce_sum() * weight))
+    }
+
+    #[inline(always)]
+    fn to_world(&self, local: [f32x16<S>; 3]) -> Vec3<S> {
+        Vec3(std::array::from_fn(|k| {
+            let axis = |a: usize| self.frame[a].0[k];
+            local[0].mul_add(axis(0), local[1].mul_add(axis(1), local[2] * axis(2)))
+        }))
+    }
+
+    /// What arrives from some directions, averaged over `width` radians; black where not `lit`.
+    #[inline(always)]
+    fn look(&self, direction: Vec3<S>, width: f32x16<S>, lit: mask32x16<S>) -> Hits {
+        let simd = self.simd;
+        let (sphere_distance, sphere) = self.nearest_sphere(direction);
+        let mut hits = Hits::default();
+        let lit = lit.to_bitmask();
+        let mut on_plane = 0;
+        let (mut u, mut v, mut level) =
+            (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0), u32x16::splat(simd, 0));
+        if let Some(sky) = &self.field.environment {
+            let [x, y, z] = direction.0;
+            let turned = turns(x, -z) - sky.rotation;
+            u = turned.simd_lt(0.0).select(turned + 1.0, turned);
+            v = half_turns(y);
+            level = level_of(width * (sky.dimmed.height() as f32 / PI));
+        }
+        if let (Some(board), Some((height, half))) = (&self.field.board, self.field.bodies.plane()) {
+            let [dx, dy, dz] = direction.0;
+            let distance = (f32x16::splat(simd, height as f32) - self.position.0[1]) / dy;
+            let (px, pz) =
+                (distance.mul_add(dx, self.position.0[0]), distance.mul_add(dz, self.position.0[2]));
+            let inside = px.abs().max(pz.abs()).simd_le(half as f32);
+            let hit = inside & distance.simd_gt(0.0) & distance.simd_lt(sphere_distance);
+            on_plane = hit.to_bitmask() & lit;
+            if on_plane != 0 {
+                // The footprint is stretched along the ray at grazing angles; a square of equal area stands for it.
+                let footprint = width * distance / dy.abs().sqrt().max(0.05);
+                let scale = 0.5 / half as f32;
+                let (pu, pv) = (px.mul_add(scale, f32x16::splat(simd, 0.5)), pz.mul_add(scale, 0.5));
+                u = hit.select(pu, u);
+                v = hit.select(pv, v);
+                level = hit.select(level_of(footprint * (board.texels() as f32 * scale)), level);
+            }
+        }
+        let (u, v, level) = (u.to_array(), v.to_array(), level.to_array());
+        for lane in 0..LANES {
+            if lit >> lane & 1 == 0 {
+                continue;
+            }
+            let light = if on_plane >> lane & 1 == 1 {
+                self.field
+                    .board
+                    .as_ref()
+                    .map_or(Rgb::ZERO, |b| b.radiance.at_level(u[lane], v[lane], level[lane]))
+            } else if sphere[lane] != f32::MAX {
+                self.sphere_radiance(&direction, lane, sphere[lane])
+            } else {
+                self.field
+                    .environment
+                    .as_ref()
+                    .map_or(Rgb::ZERO, |e| e.dimmed.at_level(u[lane], v[lane], level[lane]))
+            };
+            (0..4).for_each(|c| hits.light[c][lane] = light[c]);
+        }
+        hits.on_plane = on_plane;
+        (hits.u, hits.v) = (u, v);
+        hits
+    }
+
+    /// Distance to the nearest sphere in each lane, infinite where there is none; the second is the same, with
+    /// [`f32::MAX`] for infinity.
+    #[inline(always)]
+    fn nearest_sphere(&self, direction: Vec3<S>) -> (f32x16<S>, Lanes) {
+        let mut nearest = f32x16::splat(self.simd, f32::MAX);
+        if self.field.bodies.spheres().len() < 2 {
+            // The only sphere is the one that the rays start from.
+            return (nearest, [f32::MAX; LANES]);
+        }
+        for (centre, radius) in self.field.bodies.spheres() {
+            let from_centre = Vec3(std::array::from_fn(|k| self.position.0[k] - centre[k] as f32));
+            let along = from_centre.dot(direction);
+            let axis = from_centre.along(-along, direction);
+            let discriminant = -axis.dot(axis) + (radius * radius) as f32;
+            let distance = -along - discriminant.max(0.0).sqrt();
+            // A ray that leaves its own sphere has `along` near its radius: above 0.
+            let hit = discriminant.simd_gt(0.0)
+                & along.simd_lt(0.0)
+                & distance.simd_gt(0.0)
+                & distance.simd_lt(nearest);
+            nearest = hit.select(distance, nearest);
+        }
+        (nearest, nearest.to_array())
+    }
+
+    /// Radiance of the sphere that a lane's ray meets.
+    fn sphere_radiance(&self, direction: &Vec3<S>, lane: usize, _distance: f32) -> Rgb {
+        let place: Place = self.points[lane % self.points.len()].point.place;
+        let [x, y, z] = direction.0.map(|axis| f64::from(axis[lane]));
+        self.field.body_radiance(&place, DVec3::new(x, y, z).normalize(), 0.0).unwrap_or(Rgb::ZERO)
+    }
+}
+
+/// What sixteen rays met.
+#[derive(Default)]
+struct Hits {
+    /// Red, green, blue, and the albedo's luminance over π.
+    light: [Lanes; 4],
+    /// Bits of the lanes that met the checkerboard, and where on it.
+    on_plane: u64,
+    u: Lanes,
+    v: Lanes,
+}
+
+#[inline(always)]
+fn add_functions(
+    functions: &Functions,
+    hits: &Hits,
+    x: &Lanes,
+    sums: &mut [[f32; functions::COUNT]; FUNCTION_TERMS],
+) {
+    for lane in 0..LANES {
+        if hits.on_plane >> lane & 1 == 0 {
+            continue;
+        }
+        let values = functions.at(hits.u[lane], hits.v[lane]);
+        let albedo = hits.light[3][lane];
+        for (sum, polynomial) in sums.iter_mut().zip([1.0, x[lane]]) {
+            for (sum, value) in sum.iter_mut().zip(values) {
+                *sum += albedo * polynomial * value;
+            }
+        }
+    }
+}
+
+/// Sine and cosine of angles in `[−2π, 2π]`, to 2e-6.
+#[inline(always)]
+fn sin_cos<S: Simd>(angle: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+    // Of a quarter of the angle, by its series; then doubled twice.
+    let a = angle * 0.25;
+    let s = a * a;
+    let sine = s.mul_add(2.755_731_9e-6, -1.984_127e-4);
+    let sine = s.mul_add(sine, 8.333_333e-3);
+    let sine = s.mul_add(sine, -1.666_666_7e-1);
+    let sine = (s * sine).mul_add(a, a);
+    let cosine = s.mul_add(2.480_158_7e-5, -1.388_888_9e-3);
+    let cosine = s.mul_add(cosine, 4.166_666_6e-2);
+    let cosine = s.mul_add(cosine, -0.5);
+    let cosine = s.mul_add(cosine, 1.0);
+    let double = |(s, c): (f32x16<S>, f32x16<S>)| (s * c * 2.0, (s * s).mul_add(-2.0, 1.0));
+    double(double((sine, cosine)))
+}
+
+/// `atan2(y, x)/2π` in `[0, 1]`: see [`crate::angles::turns`].
+#[inline(always)]
+fn turns<S: Simd>(y: f32x16<S>, x: f32x16<S>) -> f32x16<S> {
+    let (ax, ay) = (x.abs(), y.abs());
+    let a = ax.min(ay) / ax.max(ay).max(f32::MIN_POSITIVE);
+    let s = a * a;
+    let p = s.mul_add(-0.011_721_2, 0.052_653_32);
+    let p = s.mul_add(p, -0.116_432_87);
+    let p = s.mul_add(p, 0.193_543_46);
+    let p = s.mul_add(p, -0.332_623_47);
+    let angle = s.mul_add(p, 0.999_977_26) * a;
+    let angle = ay.simd_gt(ax).select(FRAC_PI_2 - angle, angle);
+    let angle = x.simd_lt(0.0).select(PI - angle, angle);
+    let angle = y.simd_lt(0.0).select(TAU - angle, angle);
+    angle * (1.0 / TAU)
+}
+
+/// `acos(x)/π`: see [`crate::angles::half_turns`].
+#[inline(always)]
+fn half_turns<S: Simd>(x: f32x16<S>) -> f32x16<S> {
+    let a = x.abs().min(1.0);
+    let p = a.mul_add(-0.018_729_3, 0.074_261_0);
+    let p = a.mul_add(p, -0.212_114_4);
+    let angle = (1.0 - a).sqrt() * a.mul_add(p, 1.570_728_8);
+    x.simd_lt(0.0).select(PI - angle, angle) * (1.0 / PI)
+}
+
+/// The level of a pyramid whose texels are closest to a footprint of `texels` of the finest one.
+#[inline(always)]
+fn level_of<S: Simd>(texels: f32x16<S>) -> u32x16<S> {
+    // The exponent of the number, rounded on the scale of the logarithm.
+    let bits = (texels * (2.0 * FRAC_1_SQRT_2)).max(1.0).to_bits();
+    (bits >> 23) - 127
+}
