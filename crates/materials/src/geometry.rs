@@ -72,6 +72,17 @@ impl Geometry<f64> {
 }
 
 impl<T: Real> Geometry<T> {
+    /// The same reflection with both directions turned about the normal by an angle.
+    pub fn turned(&self, sin: T, cos: T) -> Self {
+        let turn = |w: [T; 3]| [cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]];
+        let (wi, wo) = (turn(self.wi), turn(self.wo));
+        let [x, y] = [wi[0] + wo[0], wi[1] + wo[1]];
+        let (across, tan2) = (x * x + y * y, self.tan2_h[0] + self.tan2_h[1]);
+        // tan²θ_h stays what it is; only its parts along the axes change.
+        let part = |v: T| if across > T::zero() { tan2 * (v * v) / across } else { T::zero() };
+        Self { wi, wo, tan2_h: [part(x), part(y)], ..*self }
+    }
+
     /// Cosine of the light's polar angle.
     pub fn cos_i(&self) -> T {
         self.wi[2]

@@ -19,11 +19,11 @@ const OVERLAP: f32 = 1.5;
 /// Terms that are kept of the moments of functions on the checkerboard.
 pub(crate) const FUNCTION_TERMS: usize = 2;
 
-/// Light of a row by basis function: red, green, blue, and what the checkerboard would send if its irradiance were π
-/// everywhere (its albedo's luminance).
+/// Light of a row by basis function: red, green, blue, and what the checkerboard would send if its irradiance were 1
+/// everywhere (its albedo's luminance over π).
 pub(crate) type Moments = [[[f32; 4]; TERMS]; NODES];
 
-/// For some functions on the checkerboard: what it would send if its irradiance were π times the function.
+/// For some functions on the checkerboard: what it would send if its irradiance were the function.
 pub(crate) type FunctionMoments = [[[f32; functions::COUNT]; FUNCTION_TERMS]; NODES];
 
 /// How densely the rings are sampled.

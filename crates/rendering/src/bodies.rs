@@ -64,6 +64,12 @@ impl Bodies {
         self.first(point, (light - point) / distance, from).is_some_and(|(t, _)| t < distance)
     }
 
+    /// True where a sphere lies between a point of the body `from` and a point of the checkerboard.
+    pub(crate) fn blocked(&self, point: DVec3, on_plane: DVec3, from: Body) -> bool {
+        let direction = (on_plane - point).normalize();
+        matches!(self.first(point, direction, Some(from)), Some((_, Body::Sphere(_))))
+    }
+
     /// Outward unit normal of a sphere at a point on it.
     pub(crate) fn normal(&self, sphere: usize, point: DVec3) -> DVec3 {
         let (centre, radius) = self.spheres[sphere];

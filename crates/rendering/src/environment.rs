@@ -81,6 +81,12 @@ impl EnvironmentMap {
         self.look_up(&self.dimmed, direction, angle)
     }
 
+    /// Leaves the lamps in the map, to be met by look-ups.
+    pub(crate) fn keep_lamps(&mut self) {
+        self.dimmed = self.pyramid.clone();
+        self.lamps.clear();
+    }
+
     fn look_up(&self, pyramid: &Pyramid, direction: DVec3, angle: f64) -> Rgb {
         let (mut u, v) = map_position(direction);
         u -= self.rotation;

@@ -55,15 +55,7 @@ impl Field {
         });
         let texture = |(k, sphere): (usize, &crate::Sphere)| {
             let albedo = rgb(sphere.diffuse?);
-            let (columns, rows) = (2 * SPHERE_ROWS, SPHERE_ROWS);
-            let texel = |i: usize| {
-                let unit = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
-                let normal = map_direction(unit(i % columns, columns), unit(i / columns, rows));
-                let place = Place { position: self.bodies.point(k, normal), normal, body: Body::Sphere(k) };
-                albedo * (self.smooth_irradiance(&place) + sharp(&place)) / PI
-            };
-            let texels = (0..columns * rows).into_par_iter().map(texel).collect();
-            Some(Pyramid::new(columns, rows, texels, true, |v| (std::f64::consts::PI * v).sin()))
+            Some(self.sphere_texture(k, albedo, |place| self.smooth_irradiance(place) + sharp(place)))
         };
         let spheres = scene.spheres.iter().enumerate().map(texture).collect();
         Self { board, spheres, ..self.clone() }
@@ -123,6 +115,56 @@ impl Field {
                 texture.sample(u, v, 1.0)
             }),
         })
+    }
+
+    /// Where a ray meets the checkerboard, and the luminance of its albedo over π averaged over about `angle` radians.
+    pub(crate) fn board_at(&self, place: &Place, direction: DVec3, angle: f64) -> Option<(f32, f32, f32)> {
+        let (distance, body) = self.bodies.first(place.position, direction, Some(place.body))?;
+        let board = self.board.as_ref().filter(|_| body == Body::Plane)?;
+        let width = angle * distance / direction.y.abs().sqrt().max(0.05);
+        Some(board.brightness_over(place.position + direction * distance, width))
+    }
+
+    /// The same for a ray from the camera, exactly.
+    pub(crate) fn board_from(&self, eye: DVec3, direction: DVec3) -> Option<(f32, f32, f32)> {
+        let (distance, body) = self.bodies.first(eye, direction, None)?;
+        let board = self.board.as_ref().filter(|_| body == Body::Plane)?;
+        Some(board.brightness_exactly(eye + direction * distance))
+    }
+
+    /// The same light with the environment's lamps left in its map.
+    pub(crate) fn with_lamps_in_the_map(&self) -> Self {
+        let mut field = self.clone();
+        if let Some(environment) = &mut field.environment {
+            environment.keep_lamps();
+        }
+        field
+    }
+
+    /// The diffuse radiance of a sphere with an albedo of 1, by direction from its centre.
+    pub(crate) fn white_sphere(&self, sphere: usize) -> Pyramid {
+        self.sphere_texture(sphere, Rgb::ONE, |place| {
+            self.smooth_irradiance(place) + self.point_irradiance(place)
+        })
+    }
+
+    /// The diffuse radiance of a sphere for an irradiance.
+    fn sphere_texture(
+        &self,
+        sphere: usize,
+        albedo: Rgb,
+        irradiance: impl Fn(&Place) -> Rgb + Sync,
+    ) -> Pyramid {
+        let (columns, rows) = (2 * SPHERE_ROWS, SPHERE_ROWS);
+        let texel = |i: usize| {
+            let unit = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
+            let normal = map_direction(unit(i % columns, columns), unit(i / columns, rows));
+            let place =
+                Place { position: self.bodies.point(sphere, normal), normal, body: Body::Sphere(sphere) };
+            albedo * irradiance(&place) / PI
+        };
+        let texels = (0..columns * rows).into_par_iter().map(texel).collect();
+        Pyramid::new(columns, rows, texels, true, |v| (std::f64::consts::PI * v).sin())
     }
 
     /// What the camera sees along a ray that meets no sphere.

@@ -1,4 +1,6 @@
-//! Some functions on the checkerboard, tabulated side by side.
+//! Some functions on a square, tabulated side by side: of the checkerboard, or of the directions from a sphere's centre.
+
+use rayon::prelude::*;
 
 /// How many.
 pub(crate) const COUNT: usize = 16;
@@ -13,9 +15,11 @@ pub(crate) struct Functions {
 
 impl Functions {
     /// Tabulates functions of `u, v` in `[0, 1]`.
-    pub(crate) fn new(value: impl Fn(f64, f64) -> [f32; COUNT]) -> Self {
+    pub(crate) fn new(value: impl Fn(f64, f64) -> [f32; COUNT] + Sync) -> Self {
         let unit = |k: usize| k as f64 / (SIDE - 1) as f64;
-        Self { values: (0..SIDE * SIDE).map(|i| value(unit(i % SIDE), unit(i / SIDE))).collect() }
+        Self {
+            values: (0..SIDE * SIDE).into_par_iter().map(|i| value(unit(i % SIDE), unit(i / SIDE))).collect(),
+        }
     }
 
     /// All functions at a point.

@@ -13,6 +13,7 @@
 mod angles;
 mod arcs;
 mod bodies;
+mod bounce;
 mod designed_map;
 mod environment;
 mod error;
@@ -20,6 +21,7 @@ mod field;
 mod film;
 mod functions;
 mod gather;
+mod grid;
 mod highlights;
 mod irradiance;
 mod lobe_table;

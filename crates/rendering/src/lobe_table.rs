@@ -25,10 +25,13 @@ pub(crate) struct LobeTable {
 }
 
 impl LobeTable {
-    /// Expands the specular lobe of an isotropic BSDF.
+    /// Expands the specular lobe of a BSDF; one that is not isotropic is averaged over all turns about the normal.
     pub(crate) fn new(bsdf: &dyn Bsdf) -> Self {
         let quadrature = &*QUADRATURE;
-        let lobe = bsdf.specular_all(&quadrature.geometries);
+        let lobe = match bsdf.is_isotropic() {
+            true => bsdf.specular_all(&quadrature.geometries),
+            false => averaged(bsdf, &quadrature.geometries),
+        };
         let mut products = vec![[[0.0; 3 * TERMS]; NODES]; ANGLES];
         let mut used = 0;
         for ring in &quadrature.rings {
@@ -48,6 +51,16 @@ impl LobeTable {
         Self { angles: products.iter_mut().map(coefficients).collect() }
     }
 
+    /// The largest tabulated angle, in radians.
+    pub(crate) fn last_angle() -> f64 {
+        spacing() * (ANGLES - 1) as f64
+    }
+
+    /// The coefficients at every third of the tabulated angles, the last among them.
+    pub(crate) fn every_third(&self) -> impl Iterator<Item = &Coefficients> {
+        self.angles.iter().step_by(3)
+    }
+
     /// The coefficients at an angle of view, in radians.
     pub(crate) fn at(&self, theta: f64) -> Coefficients {
         let x = (theta / spacing()).clamp(0.0, (ANGLES - 1) as f64);
@@ -61,6 +74,21 @@ impl LobeTable {
         }
         blended
     }
+}
+
+/// The mean of an anisotropic lobe over turns about the normal.
+fn averaged(bsdf: &dyn Bsdf, geometries: &[Geometry<f32>]) -> Vec<[f32; 3]> {
+    const TURNS: usize = 8;
+    let mut mean = vec![[0.0; 3]; geometries.len()];
+    for turn in 0..TURNS {
+        let (sin, cos) = (PI * (turn as f64 + 0.5) / TURNS as f64).sin_cos();
+        let turned: Vec<Geometry<f32>> =
+            geometries.iter().map(|g| g.turned(sin as f32, cos as f32)).collect();
+        for (mean, f) in mean.iter_mut().zip(bsdf.specular_all(&turned)) {
+            (0..3).for_each(|c| mean[c] += f[c] / TURNS as f32);
+        }
+    }
+    mean
 }
 
 /// The moments of `f` on one ring with each Chebyshev polynomial, channels side by side.

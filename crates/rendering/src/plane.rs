@@ -69,6 +69,25 @@ impl Board {
         TEXELS
     }
 
+    /// For each channel, the mean albedo relative to its luminance.
+    pub(crate) fn tint(&self) -> [f32; 3] {
+        let [r, g, b, _] = (self.albedo[0] + self.albedo[1]).to_array();
+        let luminance = lookmatch_imaging::luminance([r, g, b]);
+        [r, g, b].map(|c| if luminance > 0.0 { c / luminance } else { 1.0 })
+    }
+
+    /// Where a point lies in the unit square, and the luminance of the albedo over π averaged over `width` metres.
+    pub(crate) fn brightness_over(&self, point: DVec3, width: f64) -> (f32, f32, f32) {
+        let (u, v) = self.position(point);
+        (u, v, self.radiance_over(point, width).w)
+    }
+
+    /// The same at a point.
+    pub(crate) fn brightness_exactly(&self, point: DVec3) -> (f32, f32, f32) {
+        let (u, v) = self.position(point);
+        (u, v, self.brightness_at(point))
+    }
+
     /// Luminance of the albedo over π.
     fn brightness_at(&self, point: DVec3) -> f32 {
         let [r, g, b, _] = self.albedo_at(point).to_array();

@@ -6,8 +6,10 @@
 
 use fearless_simd::{Level, dispatch, prelude::*};
 
+use crate::arcs::FUNCTION_TERMS;
+use crate::bounce::{MODES, Weights};
 use crate::lobe_table::Coefficients;
-use crate::rings::ROW;
+use crate::rings::{NODES, ROW, TERMS};
 
 /// Rows that are multiplied together.
 pub(crate) const LANES: usize = 16;
@@ -17,6 +19,72 @@ pub(crate) type Lanes = [f32; LANES];
 
 /// The moments of some rows: by basis function and channel.
 pub(crate) type Moments = [[Lanes; 3]; ROW];
+
+/// Neighbouring nodes that share the means of the modes.
+pub(crate) const GROUP: usize = 4;
+const GROUPS: usize = NODES / GROUP;
+const _: () = assert!(NODES.is_multiple_of(GROUP));
+
+/// What the checkerboard sends to some rows.
+#[derive(Clone, Debug)]
+pub(crate) struct Reflected {
+    /// For an irradiance of 1, by node and term.
+    pub(crate) board: [[Lanes; FUNCTION_TERMS]; NODES],
+    /// Mean of each mode of the added irradiance over what a group of nodes sees of the checkerboard.
+    pub(crate) modes: [[Lanes; MODES]; GROUPS],
+}
+
+impl Default for Reflected {
+    fn default() -> Self {
+        Self { board: [[[0.0; LANES]; FUNCTION_TERMS]; NODES], modes: [[[0.0; LANES]; MODES]; GROUPS] }
+    }
+}
+
+/// Adds what a lobe reflects of the irradiance that its material adds to the checkerboard.
+pub(crate) fn add_reflected(
+    reflected: &Reflected,
+    lobe: &Coefficients,
+    weights: &Weights,
+    out: &mut [Lanes; 3],
+) {
+    let level = Level::new();
+    dispatch!(level, simd => reflected_at(simd, reflected, lobe, weights, out));
+}
+
+#[inline(always)]
+fn reflected_at<S: Simd>(
+    simd: S,
+    reflected: &Reflected,
+    lobe: &Coefficients,
+    weights: &Weights,
+    out: &mut [Lanes; 3],
+) {
+    let width = S::f32s::LEN.min(LANES);
+    for first in (0..LANES).step_by(width) {
+        let lanes = first..first + width;
+        let load = |values: &Lanes| S::f32s::from_slice(simd, &values[lanes.clone()]);
+        let mut sums: [S::f32s; 3] = std::array::from_fn(|c| load(&out[c]));
+        for group in 0..GROUPS {
+            let mut board = [S::f32s::splat(simd, 0.0); 3];
+            for j in group * GROUP..(group + 1) * GROUP {
+                for k in 0..FUNCTION_TERMS {
+                    let moment = load(&reflected.board[j][k]);
+                    let coefficients = &lobe[j * TERMS + k];
+                    (0..3).for_each(|c| {
+                        board[c] = S::f32s::splat(simd, coefficients[c]).mul_add(moment, board[c])
+                    });
+                }
+            }
+            let mut added = [S::f32s::splat(simd, 0.0); 3];
+            for m in 0..MODES {
+                let mode = load(&reflected.modes[group][m]);
+                (0..3).for_each(|c| added[c] = S::f32s::splat(simd, weights[m][c]).mul_add(mode, added[c]));
+            }
+            (0..3).for_each(|c| sums[c] = board[c].mul_add(added[c], sums[c]));
+        }
+        (0..3).for_each(|c| sums[c].store_slice(&mut out[c][lanes.clone()]));
+    }
+}
 
 /// For each lobe and channel, `Σ_i c_i J_i` of each row.
 pub(crate) fn products(moments: &Moments, lobes: &[Coefficients], out: &mut [[Lanes; 3]]) {

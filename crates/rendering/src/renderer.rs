@@ -7,6 +7,7 @@ use lookmatch_materials::{Bsdf, Material, Role};
 use rayon::prelude::*;
 
 use crate::bodies::Body;
+use crate::bounce::{Bounce, BounceLobe, MODES, Weights};
 use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES, SurfacePoint};
 use crate::gather;
@@ -15,7 +16,7 @@ use crate::irradiance::Place;
 use crate::lobe_table::LobeTable;
 use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
-use crate::transport::Transport;
+use crate::transport::{Lobe, Transport};
 use crate::{Rgb, SceneError, rgb};
 
 #[cfg(test)]
@@ -42,6 +43,10 @@ pub struct Renderer {
     subjects: Vec<u32>,
     rows: Rows,
     diffuse: Vec<DiffuseLight>,
+    /// The interreflection between subjects and checkerboard, …
+    bounce: Option<Bounce>,
+    /// … and, for pixels that see the checkerboard, what it sends there of an irradiance in each mode.
+    board: Vec<(u32, [f32; MODES])>,
     highlights: Highlights,
     /// Prepared ring transport; without it, it is gathered anew for each picture.
     transport: Option<Transport>,
@@ -49,12 +54,17 @@ pub struct Renderer {
 }
 
 /// Light that leaves a subject pixel diffusely.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct DiffuseLight {
     /// From spheres with a colour of their own.
     own: Rgb,
     /// From the others, for an albedo of 1.
     white: Rgb,
+    /// Share of the pixel that they cover, by colour of their own and without one.
+    own_share: Rgb,
+    white_share: f32,
+    /// For an albedo of 1, of an irradiance of the checkerboard in each mode of the interreflection.
+    modes: [f32; MODES],
 }
 
 impl Renderer {
@@ -84,15 +94,32 @@ impl Renderer {
         let pixels: Vec<u32> = (0..hits.len() as u32).filter(|i| hits[*i as usize]).collect();
         let rows = Rows::new(&field, &film, &pixels);
         let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
-        let diffuse = subjects.par_iter().map(|p| diffuse_light(scene, &field, &film, *p as usize)).collect();
+        let bounce = Bounce::prepare(scene, &field);
+        let diffuse = subjects
+            .par_iter()
+            .map(|p| diffuse_light(scene, &field, &film, bounce.as_ref(), *p as usize))
+            .collect();
+        let board = bounce.as_ref().map_or(Vec::new(), |bounce| seen_modes(&field, &film, bounce));
         let highlights = Highlights::prepare(&field, &film, &subjects);
         let mask = subject_mask(scene, &film)?;
-        Ok(Self { field, film, background, subjects, rows, diffuse, highlights, transport: None, mask })
+        Ok(Self {
+            field,
+            film,
+            background,
+            subjects,
+            rows,
+            diffuse,
+            bounce,
+            board,
+            highlights,
+            transport: None,
+            mask,
+        })
     }
 
     /// Keeps the ring transport for all further pictures: about 1 KB per subject pixel.
     pub fn keep_transport(mut self) -> Self {
-        self.transport = Some(Transport::gather(&self.field, &self.film, &self.rows));
+        self.transport = Some(Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()));
         self
     }
 
@@ -109,11 +136,27 @@ impl Renderer {
             Part::Full => self.specular_batch(&bsdfs),
             Part::DiffuseOnly => vec![vec![[0.0; 3]; self.subjects.len()]; materials.len()],
         };
-        materials.iter().zip(&specular).map(|(m, s)| self.developed(&self.diffuse_pixels(m), s)).collect()
+        let weights = |bsdf: &&dyn Bsdf| match part {
+            Part::Full => self.weights(*bsdf),
+            Part::DiffuseOnly => self.diffuse_weights(bsdf.diffuse()),
+        };
+        let images = materials.iter().zip(&bsdfs).zip(&specular);
+        images.map(|((m, bsdf), s)| self.developed(&self.diffuse_pixels(m), s, &weights(bsdf))).collect()
+    }
+
+    /// The irradiance that a material adds to the checkerboard.
+    fn weights(&self, bsdf: &dyn Bsdf) -> Weights {
+        let lobe = bsdf.sampling().map(|_| BounceLobe::new(&LobeTable::new(bsdf)));
+        self.bounce.as_ref().map_or([[0.0; 3]; MODES], |b| b.weights(lobe.as_ref(), bsdf.diffuse()))
+    }
+
+    /// The same of its diffuse term alone.
+    fn diffuse_weights(&self, albedo: [f64; 3]) -> Weights {
+        self.bounce.as_ref().map_or([[0.0; 3]; MODES], |b| b.weights(None, albedo))
     }
 
     /// The background with the subject pixels laid over it.
-    fn developed(&self, diffuse: &[[f32; 3]], specular: &[[f32; 3]]) -> Image {
+    fn developed(&self, diffuse: &[[f32; 3]], specular: &[[f32; 3]], weights: &Weights) -> Image {
         let mut image = Image::new(self.film.size, self.film.size);
         for (out, b) in image.pixels_mut().iter_mut().zip(&self.background) {
             *out = [b.x, b.y, b.z];
@@ -121,6 +164,10 @@ impl Renderer {
         for (k, pixel) in self.subjects.iter().enumerate() {
             let out = &mut image.pixels_mut()[*pixel as usize];
             (0..3).for_each(|c| out[c] += diffuse[k][c] + specular[k][c]);
+        }
+        for (pixel, modes) in &self.board {
+            let out = &mut image.pixels_mut()[*pixel as usize];
+            (0..3).for_each(|c| out[c] += modes.iter().zip(weights).map(|(m, w)| m * w[c]).sum::<f32>());
         }
         image
     }
@@ -147,50 +194,74 @@ impl Renderer {
 
     /// [`Renderer::specular_pixels`] of several materials at once, in their order: the prepared light is read once for all.
     pub fn specular_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
-        let is_ring = |b: &&dyn Bsdf| b.sampling().is_some() && b.is_isotropic();
-        let rings: Vec<usize> = (0..bsdfs.len()).filter(|i| is_ring(&bsdfs[*i])).collect();
-        let mut images: Vec<Vec<[f32; 3]>> = bsdfs
-            .iter()
-            .map(|b| if is_ring(b) { Vec::new() } else { self.directly_integrated(*b) })
-            .collect();
-        let lobes: Vec<&dyn Bsdf> = rings.iter().map(|i| bsdfs[*i]).collect();
-        for (i, image) in rings.into_iter().zip(self.ring_batch(&lobes)) {
+        let shiny: Vec<usize> = (0..bsdfs.len()).filter(|i| bsdfs[*i].sampling().is_some()).collect();
+        let mut images = vec![vec![[0.0; 3]; self.subjects.len()]; bsdfs.len()];
+        let lobes: Vec<&dyn Bsdf> = shiny.iter().map(|i| bsdfs[*i]).collect();
+        for (i, image) in shiny.into_iter().zip(self.lobe_batch(&lobes)) {
             images[i] = image;
         }
         images
     }
 
-    /// Isotropic lobes through the ring transport.
-    fn ring_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
+    /// Lobes through the ring transport.
+    fn lobe_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
         if bsdfs.is_empty() {
             return Vec::new();
         }
-        let lobes: Vec<LobeTable> = bsdfs.par_iter().map(|b| LobeTable::new(*b)).collect();
+        let lobes: Vec<Lobe> = bsdfs.par_iter().map(|b| self.lobe(*b)).collect();
         let images = match &self.transport {
             Some(transport) => transport.radiance(&lobes),
-            None => Transport::gather(&self.field, &self.film, &self.rows).radiance(&lobes),
+            None => {
+                Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()).radiance(&lobes)
+            }
         };
-        let image = |(mut image, bsdf): ([Vec<f32>; 3], &&dyn Bsdf)| {
-            self.highlights.add(*bsdf, &mut image);
+        let image = |((mut image, bsdf), lobe): (([Vec<f32>; 3], &&dyn Bsdf), &Lobe)| {
+            self.add_diffuse_share(*bsdf, lobe, &mut image);
+            if lobe.is_isotropic {
+                self.highlights.add(*bsdf, &mut image);
+            } else {
+                self.add_directly(*bsdf, &mut image);
+            }
             let [r, g, b] = image;
             r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect()
         };
-        images.into_par_iter().zip(bsdfs).map(image).collect()
+        images.into_par_iter().zip(bsdfs).zip(&lobes).map(image).collect()
     }
 
-    /// A lobe that is not isotropic through the direct integral; black where there is no lobe.
-    fn directly_integrated(&self, bsdf: &dyn Bsdf) -> Vec<[f32; 3]> {
-        if bsdf.sampling().is_none() {
-            return vec![[0.0; 3]; self.subjects.len()];
+    fn lobe(&self, bsdf: &dyn Bsdf) -> Lobe {
+        let table = LobeTable::new(bsdf);
+        let weights = |b: &Bounce| b.weights(Some(&BounceLobe::new(&table)), bsdf.diffuse());
+        Lobe {
+            weights: self.bounce.as_ref().map_or([[0.0; 3]; MODES], weights),
+            table,
+            is_isotropic: bsdf.is_isotropic(),
         }
-        self.gathered_pixels(bsdf, gather::SAMPLES)
+    }
+
+    /// Adds what the diffuse term reflects of the light that the lobe threw onto the checkerboard.
+    fn add_diffuse_share(&self, bsdf: &dyn Bsdf, lobe: &Lobe, image: &mut [Vec<f32>; 3]) {
+        let (albedo, without) = (bsdf.diffuse(), self.diffuse_weights(bsdf.diffuse()));
+        let more: Weights =
+            std::array::from_fn(|m| std::array::from_fn(|c| lobe.weights[m][c] - without[m][c]));
+        for (k, light) in self.diffuse.iter().enumerate() {
+            let added = light.added(&more, rgb(albedo));
+            (0..3).for_each(|c| image[c][k] += added[c]);
+        }
+    }
+
+    /// Adds a lobe that is not isotropic through the direct integral.
+    fn add_directly(&self, bsdf: &dyn Bsdf, image: &mut [Vec<f32>; 3]) {
+        for (k, pixel) in self.gathered_pixels(bsdf, gather::SAMPLES).into_iter().enumerate() {
+            (0..3).for_each(|c| image[c][k] += pixel[c]);
+        }
     }
 
     /// What the diffuse term adds to each subject pixel, linear RGB.
     pub fn diffuse_pixels(&self, material: &Material) -> Vec<[f32; 3]> {
         let albedo = rgb(material.bsdf().diffuse());
+        let weights = self.diffuse_weights(material.bsdf().diffuse());
         let radiance = |d: &DiffuseLight| {
-            let sum = d.own + albedo * d.white;
+            let sum = d.own + albedo * d.white + d.added(&weights, albedo);
             [sum.x, sum.y, sum.z]
         };
         self.diffuse.iter().map(radiance).collect()
@@ -219,6 +290,30 @@ impl Scene {
     }
 }
 
+impl DiffuseLight {
+    /// What the pixel adds for an irradiance of the checkerboard.
+    fn added(&self, weights: &Weights, albedo: Rgb) -> Rgb {
+        let sum: Rgb =
+            self.modes.iter().zip(weights).map(|(m, [r, g, b])| Rgb::new(*r, *g, *b, 0.0) * *m).sum();
+        (self.own_share + albedo * self.white_share) * sum
+    }
+}
+
+/// What pixels see of the checkerboard for an irradiance in each mode.
+fn seen_modes(field: &Field, film: &Film, bounce: &Bounce) -> Vec<(u32, [f32; MODES])> {
+    let pixel = |pixel: u32| {
+        let mut sums = [0.0; MODES];
+        for direction in film.directions(pixel as usize, SUBSAMPLES) {
+            if let Some((u, v, brightness)) = field.board_from(film.eye, direction) {
+                let values = bounce.modes.at(u, v);
+                (0..MODES).for_each(|m| sums[m] += brightness * values[m] / SUBSAMPLES as f32);
+            }
+        }
+        (sums != [0.0; MODES]).then_some((pixel, sums))
+    };
+    (0..(film.size * film.size) as u32).into_par_iter().filter_map(pixel).collect()
+}
+
 /// What every pixel sees beside the subjects, and which pixels see a subject.
 fn look(field: &Field, film: &Film) -> (Vec<Rgb>, Vec<bool>) {
     let pixel = |pixel: usize| {
@@ -237,9 +332,15 @@ fn look(field: &Field, film: &Film) -> (Vec<Rgb>, Vec<bool>) {
 
 /// Diffuse light of one pixel. Point lights have hard shadows and are evaluated at each sub-pixel sample; the rest is
 /// smooth and evaluated once per sphere, at the mean of its samples.
-fn diffuse_light(scene: &Scene, field: &Field, film: &Film, pixel: usize) -> DiffuseLight {
+fn diffuse_light(
+    scene: &Scene,
+    field: &Field,
+    film: &Film,
+    bounce: Option<&Bounce>,
+    pixel: usize,
+) -> DiffuseLight {
     let points = film.subject_points(&field.bodies, pixel, SUBSAMPLES);
-    let mut light = DiffuseLight { own: Rgb::ZERO, white: Rgb::ZERO };
+    let mut light = DiffuseLight::default();
     for (sphere, description) in scene.spheres.iter().enumerate() {
         let here: Vec<&SurfacePoint> = points.iter().filter(|p| p.sphere == sphere).collect();
         let Some(first) = here.first() else { continue };
@@ -248,9 +349,18 @@ fn diffuse_light(scene: &Scene, field: &Field, film: &Film, pixel: usize) -> Dif
         let sharp: Rgb = here.iter().map(|p| field.point_irradiance(&p.place)).sum();
         let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
         let radiance = irradiance / (SUBSAMPLES as f32 * PI);
+        let share = here.len() as f32 / SUBSAMPLES as f32;
         match description.diffuse {
-            Some(own) => light.own += rgb(own) * radiance,
-            None => light.white += radiance,
+            Some(own) => {
+                (light.own, light.own_share) =
+                    (light.own + rgb(own) * radiance, light.own_share + rgb(own) * share)
+            }
+            None => (light.white, light.white_share) = (light.white + radiance, light.white_share + share),
+        }
+        if let Some(bounce) = bounce {
+            // Where several spheres share a pixel, the last one's light stands for all.
+            let tinted = bounce.irradiance(sphere, normal);
+            light.modes = tinted.map(|e| e / PI);
         }
     }
     light

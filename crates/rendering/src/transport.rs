@@ -7,12 +7,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::Rgb;
-use crate::arcs::{self, Density};
+use crate::arcs::{self, Density, FUNCTION_TERMS};
+use crate::bounce::{Bounce, MODES, Weights};
 use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES};
 use crate::highlights::is_near_lamp;
 use crate::lobe_table::LobeTable;
-use crate::product::{self, LANES, Lanes, Moments};
+use crate::product::{self, GROUP, LANES, Lanes, Moments, Reflected};
 use crate::rings::{ROW, Ring, chebyshev, hat_position};
 use crate::rows::{Row, Rows, View};
 
@@ -41,6 +42,17 @@ struct Bundle {
     /// Lanes in use.
     len: usize,
     moments: Box<Moments>,
+    /// What comes from the checkerboard, for an irradiance of 1 and for that of each mode of the interreflection.
+    reflected: Option<Box<Reflected>>,
+}
+
+/// A lobe on its way to a picture.
+pub(crate) struct Lobe {
+    pub(crate) table: LobeTable,
+    /// What its material adds to the irradiance of the checkerboard.
+    pub(crate) weights: Weights,
+    /// False where the rings cannot hold the lobe itself, but only its mean, for interreflection.
+    pub(crate) is_isotropic: bool,
 }
 
 /// Bundles that are worked on by one thread without a break.
@@ -48,9 +60,9 @@ const BLOCK: usize = 32;
 
 impl Transport {
     /// Gathers the light of all rows.
-    pub(crate) fn gather(field: &Field, film: &Film, rows: &Rows) -> Self {
+    pub(crate) fn gather(field: &Field, film: &Film, rows: &Rows, bounce: Option<&Bounce>) -> Self {
         let gather = |rows: &[Row]| -> Vec<Bundle> {
-            bundled(rows).into_par_iter().map(|rows| Bundle::gather(field, film, rows)).collect()
+            bundled(rows).into_par_iter().map(|rows| Bundle::gather(field, film, rows, bounce)).collect()
         };
         let place: HashMap<u32, u32> = rows.main.iter().zip(0..).map(|(row, k)| (row.pixel, k)).collect();
         Self {
@@ -60,8 +72,9 @@ impl Transport {
         }
     }
 
-    /// The radiance of all rows' pixels through some lobes: for each lobe three planes, one for each channel.
-    pub(crate) fn radiance(&self, lobes: &[LobeTable]) -> Vec<[Vec<f32>; 3]> {
+    /// The radiance of all rows' pixels through some lobes, each with the irradiance that its material adds to the
+    /// checkerboard: for each lobe three planes, one for each channel.
+    pub(crate) fn radiance(&self, lobes: &[Lobe]) -> Vec<[Vec<f32>; 3]> {
         let mut images = planes(&self.main, lobes);
         let more = planes(&self.more, lobes);
         images.par_iter_mut().zip(more).for_each(|(image, more)| {
@@ -87,7 +100,7 @@ fn bundled(rows: &[Row]) -> Vec<&[Row]> {
 }
 
 /// The products of all bundles with all lobes.
-fn planes(bundles: &[Bundle], lobes: &[LobeTable]) -> Vec<[Vec<f32>; 3]> {
+fn planes(bundles: &[Bundle], lobes: &[Lobe]) -> Vec<[Vec<f32>; 3]> {
     let blocks: Vec<Vec<[Lanes; 3]>> =
         bundles.par_chunks(BLOCK).map(|bundles| block(bundles, lobes)).collect();
     let plane = |m: usize, c: usize| -> Vec<f32> {
@@ -100,7 +113,7 @@ fn planes(bundles: &[Bundle], lobes: &[LobeTable]) -> Vec<[Vec<f32>; 3]> {
 }
 
 /// The products of some bundles with all lobes, lobe by lobe for each bundle.
-fn block(bundles: &[Bundle], lobes: &[LobeTable]) -> Vec<[Lanes; 3]> {
+fn block(bundles: &[Bundle], lobes: &[Lobe]) -> Vec<[Lanes; 3]> {
     let mut products = vec![[[0.0; LANES]; 3]; bundles.len() * lobes.len()];
     let mut coefficients = Vec::new();
     let mut theta = f64::NAN;
@@ -108,24 +121,59 @@ fn block(bundles: &[Bundle], lobes: &[LobeTable]) -> Vec<[Lanes; 3]> {
         if bundle.theta != theta {
             theta = bundle.theta;
             coefficients.clear();
-            coefficients.extend(lobes.iter().map(|lobe| lobe.at(theta)));
+            coefficients.extend(lobes.iter().map(|lobe| lobe.table.at(theta)));
         }
         product::products(&bundle.moments, &coefficients, out);
+        if let Some(reflected) = &bundle.reflected {
+            for ((coefficients, lobe), out) in coefficients.iter().zip(lobes).zip(out) {
+                if !lobe.is_isotropic {
+                    *out = [[0.0; LANES]; 3];
+                }
+                product::add_reflected(reflected, coefficients, &lobe.weights, out);
+            }
+        }
     }
     products
 }
 
 impl Bundle {
-    fn gather(field: &Field, film: &Film, rows: &[Row]) -> Self {
+    fn gather(field: &Field, film: &Film, rows: &[Row], bounce: Option<&Bounce>) -> Self {
         let mut moments = Box::new([[[0.0; LANES]; 3]; ROW]);
+        let mut reflected = bounce.map(|_| Box::new(Reflected::default()));
         for (lane, row) in rows.iter().enumerate() {
-            let sums = gather_row(field, &row.views(field, film));
+            let views = row.views(field, film);
+            let sums = gather_row(field, &views);
+            if let (Some(bounce), Some(reflected)) = (bounce, &mut reflected) {
+                reflected.set(lane, &sums, field, bounce, &views);
+            }
             for (i, sum) in sums.as_flattened().iter().enumerate() {
                 (0..3).for_each(|c| moments[i][c][lane] = sum[c]);
             }
         }
         let mean = rows.iter().map(|row| row.theta).sum::<f64>() / rows.len() as f64;
-        Self { theta: (mean / ANGLE_STEP).round() * ANGLE_STEP, len: rows.len(), moments }
+        Self { theta: (mean / ANGLE_STEP).round() * ANGLE_STEP, len: rows.len(), moments, reflected }
+    }
+}
+
+/// Rings between two nodes for the modes of the interreflection: only their means over the checkerboard are needed.
+const MODE_STRATA: usize = 2;
+
+impl Reflected {
+    /// Sets the lane of a row whose moments are known.
+    fn set(&mut self, lane: usize, moments: &arcs::Moments, field: &Field, bounce: &Bounce, points: &[View]) {
+        for (board, moments) in self.board.iter_mut().zip(moments) {
+            (0..FUNCTION_TERMS).for_each(|k| board[k][lane] = moments[k][3]);
+        }
+        let density = Density { strata: MODE_STRATA, spread: normal_spread(points) as f32 };
+        let (whole, modes) = arcs::moments_with(field, &bounce.modes, points, density);
+        for (group, modes_of_group) in self.modes.iter_mut().enumerate() {
+            let nodes = group * GROUP..(group + 1) * GROUP;
+            let board: f32 = nodes.clone().map(|j| whole[j][0][3]).sum();
+            for m in 0..MODES {
+                let mode: f32 = nodes.clone().map(|j| modes[j][0][m]).sum();
+                modes_of_group[m][lane] = if board > 0.0 { mode / board } else { 0.0 };
+            }
+        }
     }
 }
 

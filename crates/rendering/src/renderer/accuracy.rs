@@ -38,7 +38,10 @@ fn thinned(scene: &Scene, illumination: Illumination) -> Renderer {
     pixels.sort();
     let rows = Rows::new(field, film, &pixels.into_iter().step_by(STEP).collect::<Vec<_>>());
     let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
-    let diffuse = subjects.iter().map(|p| diffuse_light(scene, field, film, *p as usize)).collect();
+    let diffuse = subjects
+        .iter()
+        .map(|p| diffuse_light(scene, field, film, renderer.bounce.as_ref(), *p as usize))
+        .collect();
     let highlights = Highlights::prepare(field, film, &subjects);
     Renderer { subjects, rows, diffuse, highlights, ..renderer }.keep_transport()
 }
