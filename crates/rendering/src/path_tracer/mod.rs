@@ -158,11 +158,8 @@ impl PathTracer {
                 continue;
             };
             let branch = if walk.depth == 0 { k } else { walk.branch };
-            let strength = walk.strength * scattering.value.max_element() / scattering.density;
-            let Some((walk, chance)) = (Walk { depth: walk.depth + 1, branch, strength }).survive(sampler)
-            else {
-                continue;
-            };
+            let next_walk = Walk { depth: walk.depth + 1, branch, strength: walk.strength * vertex.albedo };
+            let Some((walk, chance)) = next_walk.survive(sampler) else { continue };
             let next = self.vertex(vertex.coat(), at, -direction);
             sum += scattering.value * self.reflected(&next, sampler, walk) / (density * chance);
         }
@@ -208,7 +205,8 @@ struct Walk {
     depth: u32,
     /// Which of the paths from the first point this is.
     branch: u32,
-    /// About the share of the light that arrives at the eye.
+    /// About the share of light that arrives at the eye: the product of the albedos. The weight of a path would not do,
+    /// because one that is aimed at a bright spot weighs little until it meets it.
     strength: f64,
 }
 
