@@ -120,7 +120,7 @@ impl PathTracer {
         let (x, y) = (pixel as usize % self.film.size, pixel as usize / self.film.size);
         let sample = |index| {
             let sampler = self.points.path(self.seed, pixel, index);
-            let [dx, dy] = sampler.set(0).first();
+            let [dx, dy] = sampler.set(0).pair(0, 0);
             self.seen(coat, self.film.direction(x as f64 + dx, y as f64 + dy), &sampler)
         };
         (0..self.samples).map(sample).sum::<DVec3>() / f64::from(self.samples)
@@ -142,10 +142,10 @@ impl PathTracer {
     /// Radiance that a point reflects to where it is seen from.
     fn reflected(&self, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
         let splits = if walk.depth == 0 { SPLITS } else { 1 };
-        let set = sampler.set(walk.depth * SPLITS + walk.branch);
-        let mut sum = self.from_lights(vertex) + self.from_sky(vertex, set.second(0), splits);
+        let numbers = walk.numbers(sampler);
+        let mut sum = self.from_lights(vertex) + self.from_sky(vertex, numbers(0), splits);
         for k in 0..splits {
-            let [u, v] = set.second(1 + k);
+            let [u, v] = numbers(1 + k);
             // One number chooses between the parts of the mixture: dealt out evenly over the paths.
             let u = (f64::from(k) + u) / f64::from(splits);
             let Some(direction) = vertex.sample([u, v]) else { continue };
@@ -213,13 +213,24 @@ struct Walk {
 impl Walk {
     const START: Self = Self { depth: 0, branch: 0, strength: 1.0 };
 
+    /// Pairs of numbers for what is decided at a point: stream 0 for the environment, 1 and above for the path's own
+    /// direction.
+    fn numbers<'a>(self, sampler: &Sampler<'a>) -> impl Fn(u32) -> [f64; 2] + use<'a> {
+        // The first points of all branches share one set with the pixel's area, deeper ones have sets of their own.
+        let place = self.depth + 1;
+        let number = if place < 4 { 0 } else { place / 4 * SPLITS + self.branch };
+        let set = sampler.set(number);
+        let stream = if self.depth == 0 { 0 } else { (1 + self.branch) * (SPLITS + 1) };
+        move |k| set.pair(place % 4, stream + k)
+    }
+
     /// Ends weak paths by chance (Russian roulette); those that go on get the chance that they had.
     fn survive(self, sampler: &Sampler) -> Option<(Self, f64)> {
         if self.depth < CERTAIN {
             return Some((self, 1.0));
         }
         let chance = self.strength.min(0.95);
-        let [u, _] = sampler.set(self.depth * SPLITS + self.branch).first();
+        let [u, _] = self.numbers(sampler)(SPLITS);
         let walk = Self { strength: self.strength / chance, ..self };
         (u < chance && self.depth < LONGEST).then_some((walk, chance))
     }
