@@ -31,7 +31,7 @@ fn main() {
     for illumination in [Illumination::Environment, Illumination::Point] {
         for text in MATERIALS {
             let material = Material::parse(text).expect("a material");
-            let scene = Scene::reference().for_model(material.model());
+            let mut scene = Scene::reference().for_model(material.model()); if std::env::var("NOPLANE").is_ok() { let p = scene.plane.as_mut().unwrap(); p.light = [0.0;3]; p.dark=[0.0;3]; }
             let precomputed = Renderer::prepare(&scene, illumination, SIZE).expect("a built-in scene");
             let pixels: Vec<u32> = precomputed.subjects().iter().copied().step_by(STEP).collect();
             let picture = precomputed.render(&material, Part::Full);

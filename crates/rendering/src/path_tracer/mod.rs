@@ -143,9 +143,10 @@ impl PathTracer {
     fn reflected(&self, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
         let splits = if walk.depth == 0 { SPLITS } else { 1 };
         let numbers = walk.numbers(sampler);
-        let mut sum = self.from_lights(vertex) + self.from_sky(vertex, numbers(0), splits);
+        let mut sum = self.from_lights(vertex);
         for k in 0..splits {
-            let [u, v] = numbers(1 + k);
+            sum += self.from_sky(vertex, numbers(2 * k)) / f64::from(splits);
+            let [u, v] = numbers(2 * k + 1);
             // One number chooses between the parts of the mixture: dealt out evenly over the paths.
             let u = (f64::from(k) + u) / f64::from(splits);
             let Some(direction) = vertex.sample([u, v]) else { continue };
@@ -153,7 +154,8 @@ impl PathTracer {
             let density = scattering.density * f64::from(splits);
             let Some(at) = self.world.first(vertex.at.position, direction, Some(vertex.at.surface)) else {
                 if let Some(sky) = &self.sky {
-                    sum += scattering.value * sky.radiance(direction) / (density + sky.density(direction));
+                    sum += scattering.value * sky.radiance(direction)
+                        / (scattering.density + sky.density(direction)) / f64::from(splits);
                 }
                 continue;
             };
@@ -182,12 +184,12 @@ impl PathTracer {
     }
 
     /// What a point reflects of the environment, by a direction drawn from its map.
-    fn from_sky(&self, vertex: &Vertex, numbers: [f64; 2], splits: u32) -> DVec3 {
+    fn from_sky(&self, vertex: &Vertex, numbers: [f64; 2]) -> DVec3 {
         let Some(sky) = &self.sky else { return DVec3::ZERO };
         let (direction, density) = sky.sample(numbers);
         match vertex.scatter(direction) {
             Some(s) if !self.hides(vertex, direction, f64::INFINITY) => {
-                s.value * sky.radiance(direction) / (density + s.density * f64::from(splits))
+                s.value * sky.radiance(direction) / (density + s.density)
             }
             _ => DVec3::ZERO,
         }
@@ -213,14 +215,14 @@ struct Walk {
 impl Walk {
     const START: Self = Self { depth: 0, branch: 0, strength: 1.0 };
 
-    /// Pairs of numbers for what is decided at a point: stream 0 for the environment, 1 and above for the path's own
+    /// Pairs of numbers for what is decided at a point: even streams for the environment, odd ones for the path's own
     /// direction.
     fn numbers<'a>(self, sampler: &Sampler<'a>) -> impl Fn(u32) -> [f64; 2] + use<'a> {
         // The first points of all branches share one set with the pixel's area, deeper ones have sets of their own.
         let place = self.depth + 1;
         let number = if place < 4 { 0 } else { place / 4 * SPLITS + self.branch };
         let set = sampler.set(number);
-        let stream = if self.depth == 0 { 0 } else { (1 + self.branch) * (SPLITS + 1) };
+        let stream = if self.depth == 0 { 0 } else { (1 + self.branch) * 2 * SPLITS };
         move |k| set.pair(place % 4, stream + k)
     }
 
@@ -230,7 +232,7 @@ impl Walk {
             return Some((self, 1.0));
         }
         let chance = self.strength.min(0.95);
-        let [u, _] = self.numbers(sampler)(SPLITS);
+        let [u, _] = self.numbers(sampler)(2);
         let walk = Self { strength: self.strength / chance, ..self };
         (u < chance && self.depth < LONGEST).then_some((walk, chance))
     }
