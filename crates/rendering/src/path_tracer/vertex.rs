@@ -95,8 +95,9 @@ impl<'a> Vertex<'a> {
         let diffuse = self.diffuse.element_sum() / 3.0;
         let lobe = match (self.lobe, diffuse > 0.0) {
             (None, _) => 0.0,
-            (_, false) => 1.0,
-            _ => (reflectance / (reflectance + diffuse)).clamp(0.1, 0.9),
+            // Wide lobes are not quite where their samples are, which may lie below the surface.
+            (Some(lobe), false) => 1.0 - 0.5 * lobe.alpha.min(1.0),
+            (Some(_), true) => (reflectance / (reflectance + diffuse)).clamp(0.1, 0.9),
         };
         let spheres = if self.visible_spheres().count() > 0 { SPHERES } else { 0.0 };
         Shares { lobe, cosine: (1.0 - lobe) * (1.0 - spheres), spheres: (1.0 - lobe) * spheres }
