@@ -18,7 +18,6 @@ const GRID: usize = 192;
 #[derive(Clone, Debug)]
 pub(crate) struct Board {
     plane: Plane,
-    albedo: [Rgb; 2],
     /// Irradiance that varies smoothly: everything but the point lights.
     smooth: Pyramid,
     /// Outgoing radiance, all lights; beside it, in the fourth lane, the luminance of the albedo over π.
@@ -36,7 +35,6 @@ impl Board {
         let grid = tabulate(plane, GRID, smooth);
         let mut board = Self {
             plane: plane.clone(),
-            albedo: [rgb(plane.light), rgb(plane.dark)],
             smooth: grid,
             radiance: Pyramid::new(1, 1, vec![Rgb::ZERO], false, |_| 1.0),
         };
@@ -54,7 +52,7 @@ impl Board {
     /// Radiance of a point for a given irradiance from the point lights.
     pub(crate) fn exact(&self, point: DVec3, sharp: Rgb) -> Rgb {
         let (u, v) = self.position(point);
-        self.albedo_at(point) * (self.smooth.sample(u, v, 1.0) + sharp) / PI
+        rgb(self.plane.albedo(point)) * (self.smooth.sample(u, v, 1.0) + sharp) / PI
     }
 
     /// Radiance averaged over a footprint of `width` metres.
@@ -71,7 +69,7 @@ impl Board {
 
     /// For each channel, the mean albedo relative to its luminance.
     pub(crate) fn tint(&self) -> [f32; 3] {
-        let [r, g, b, _] = (self.albedo[0] + self.albedo[1]).to_array();
+        let [r, g, b, _] = (rgb(self.plane.light) + rgb(self.plane.dark)).to_array();
         let luminance = lookmatch_imaging::luminance([r, g, b]);
         [r, g, b].map(|c| if luminance > 0.0 { c / luminance } else { 1.0 })
     }
@@ -90,13 +88,8 @@ impl Board {
 
     /// Luminance of the albedo over π.
     fn brightness_at(&self, point: DVec3) -> f32 {
-        let [r, g, b, _] = self.albedo_at(point).to_array();
+        let [r, g, b, _] = rgb(self.plane.albedo(point)).to_array();
         lookmatch_imaging::luminance([r, g, b]) / PI
-    }
-
-    fn albedo_at(&self, point: DVec3) -> Rgb {
-        let check = |x: f64| (x / self.plane.check_size).floor() as i64;
-        self.albedo[(check(point.x) + check(point.z)).rem_euclid(2) as usize]
     }
 
     fn position(&self, point: DVec3) -> (f32, f32) {
