@@ -1,17 +1,22 @@
 //! Gathers the moments of one row: samples on rings of half vectors, sixteen at a time. See [`crate::rings`].
 
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
+use std::sync::LazyLock;
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 use glam::DVec3;
 
 use crate::Rgb;
+use crate::bodies::Body;
+use crate::environment::EnvironmentMap;
 use crate::field::Field;
+use crate::film::SurfacePoint;
 use crate::functions::{self, Functions};
 use crate::irradiance::Place;
 use crate::product::{LANES, Lanes};
 use crate::rings::{NODES, Ring, TERMS, node};
 use crate::rows::View;
+use crate::sampling::cosine_direction;
 
 /// Width of a look-up in units of the distance between samples: neighbours overlap, so that a small bright light between
 /// them is missed by neither.
@@ -62,6 +67,51 @@ pub(crate) fn moments_with(
     (moments, of_functions)
 }
 
+/// Directions of the irradiance at one point.
+const HEMISPHERE: usize = 2048;
+
+/// Irradiance at a place from the other bodies: red, green, blue, and the fourth channel of [`Moments`].
+pub(crate) fn from_bodies(field: &Field, place: &Place) -> [f32; 4] {
+    let level = Level::new();
+    dispatch!(level, simd => hemisphere(simd, field, place))
+}
+
+/// Directions with density `cos θ/π` about the z axis, sixteen in a row for each coordinate.
+static COSINE_DIRECTIONS: LazyLock<Vec<[Lanes; 3]>> = LazyLock::new(|| {
+    let directions: Vec<DVec3> = (0..HEMISPHERE as u32).map(|i| cosine_direction(i, DVec3::Z)).collect();
+    let lanes = |chunk: &[DVec3]| std::array::from_fn(|k| std::array::from_fn(|l| chunk[l][k] as f32));
+    directions.chunks_exact(LANES).map(lanes).collect()
+});
+
+#[inline(always)]
+fn hemisphere<S: Simd>(simd: S, field: &Field, place: &Place) -> [f32; 4] {
+    // Turned from place to place, so that neighbours do not share what the samples miss.
+    let seed = place.position * 997.0;
+    let angle = (seed.x.sin() + seed.y.sin() + seed.z.sin()) * 50.0;
+    let tangent = place.normal.any_orthonormal_vector();
+    let tangent = tangent * angle.cos() + place.normal.cross(tangent) * angle.sin();
+    let frame = [tangent, place.normal.cross(tangent), place.normal];
+    let view = View {
+        point: SurfacePoint { place: *place, sphere: 0, wo: place.normal },
+        frame,
+        cosine: 1.0,
+        sine: 0.0,
+    };
+    let points = [view];
+    let density = Density { strata: 1, spread: 0.0 };
+    let gatherer = Gatherer { sky: None, ..Gatherer::new(simd, field, &points, density, None) };
+    // Each direction stands for an equal share of the projected hemisphere.
+    let width = OVERLAP * (PI / HEMISPHERE as f32).sqrt();
+    let mut sums = [f32x16::splat(simd, 0.0); 4];
+    for directions in COSINE_DIRECTIONS.iter() {
+        let local = directions.map(|axis| f32x16::load_array(simd, axis));
+        let width = f32x16::splat(simd, width) / local[2].max(0.05).sqrt();
+        let hits = gatherer.look(gatherer.to_world(local), width, local[2].simd_gt(0.0));
+        (0..4).for_each(|c| sums[c] += f32x16::load_array(simd, hits.light[c]));
+    }
+    sums.map(|sum| sum.reduce_sum() * (PI / HEMISPHERE as f32))
+}
+
 /// Adds what was found on a ring to the two hat functions that it lies under.
 #[inline(always)]
 fn deposit<const K: usize, const N: usize>(
@@ -109,6 +159,7 @@ impl<S: Simd> Vec3<S> {
 struct Gatherer<'a, S: Simd> {
     simd: S,
     field: &'a Field,
+    sky: Option<&'a EnvironmentMap>,
     functions: Option<&'a Functions>,
     points: &'a [View],
     density: Density,
@@ -154,6 +205,7 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         Self {
             simd,
             field,
+            sky: field.environment.as_ref(),
             functions,
             points,
             density,
@@ -271,7 +323,7 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         let mut on_plane = 0;
         let (mut u, mut v, mut level) =
             (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0), u32x16::splat(simd, 0));
-        if let Some(sky) = &self.field.environment {
+        if let Some(sky) = self.sky {
             let [x, y, z] = direction.0;
             let turned = turns(x, -z) - sky.rotation;
             u = turned.simd_lt(0.0).select(turned + 1.0, turned);
@@ -284,7 +336,7 @@ impl<'a, S: Simd> Gatherer<'a, S> {
             let (px, pz) =
                 (distance.mul_add(dx, self.position.0[0]), distance.mul_add(dz, self.position.0[2]));
             let inside = px.abs().max(pz.abs()).simd_le(half as f32);
-            let hit = inside & distance.simd_gt(0.0) & distance.simd_lt(sphere_distance);
+            let hit = inside & distance.simd_gt(self.least_distance()) & distance.simd_lt(sphere_distance);
             on_plane = hit.to_bitmask() & lit;
             if on_plane != 0 {
                 // The footprint is stretched along the ray at grazing angles; a square of equal area stands for it.
@@ -309,10 +361,7 @@ impl<'a, S: Simd> Gatherer<'a, S> {
             } else if sphere[lane] != f32::MAX {
                 self.sphere_radiance(&direction, lane, sphere[lane])
             } else {
-                self.field
-                    .environment
-                    .as_ref()
-                    .map_or(Rgb::ZERO, |e| e.dimmed.at_level(u[lane], v[lane], level[lane]))
+                self.sky.map_or(Rgb::ZERO, |e| e.dimmed.at_level(u[lane], v[lane], level[lane]))
             };
             (0..4).for_each(|c| hits.light[c][lane] = light[c]);
         }
@@ -321,12 +370,18 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         hits
     }
 
+    /// Distance of the checkerboard below which a ray starts from it.
+    fn least_distance(&self) -> f32 {
+        if self.points[0].point.place.body == Body::Plane { f32::INFINITY } else { 0.0 }
+    }
+
     /// Distance to the nearest sphere in each lane, infinite where there is none; the second is the same, with
     /// [`f32::MAX`] for infinity.
     #[inline(always)]
     fn nearest_sphere(&self, direction: Vec3<S>) -> (f32x16<S>, Lanes) {
         let mut nearest = f32x16::splat(self.simd, f32::MAX);
-        if self.field.bodies.spheres().len() < 2 {
+        let own = usize::from(matches!(self.points[0].point.place.body, Body::Sphere(_)));
+        if self.field.bodies.spheres().len() <= own {
             // The only sphere is the one that the rays start from.
             return (nearest, [f32::MAX; LANES]);
         }

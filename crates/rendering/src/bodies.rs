@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::Scene;
 
 /// The solid things of a scene.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Bodies {
     spheres: Vec<(DVec3, f64)>,
     /// Height and half extent of the checkerboard.

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::Rgb;
 use crate::angles::{map_direction, map_position};
-use crate::arcs::{self, Density, FUNCTION_TERMS};
+use crate::arcs::{self, Density, FUNCTION_TERMS, FunctionMoments};
 use crate::bodies::Body;
 use crate::field::Field;
 use crate::film::SurfacePoint;
@@ -39,12 +39,16 @@ const ANGLES: usize = 17;
 const ROW: usize = NODES * FUNCTION_TERMS;
 /// Coefficients of a lobe that matter here.
 const LOBE: usize = ANGLES * ROW;
-/// Rays from a node of the grid to each sphere.
-const RAYS: u32 = 64;
+/// Rays from a node of the grid to each sphere, near and far from it.
+const RAYS: [u32; 2] = [256, 64];
+/// Of these rays, each that has a multiple of this number also looks for what comes back.
+const RETURNS: u32 = 4;
+/// Distance of nodes that count as far, in radii of the sphere from its middle.
+const FAR: f64 = 1.8;
 /// Rays from a point of a sphere to the checkerboard.
 const DIFFUSE_RAYS: u32 = 256;
 /// Rings around the point that mirrors a point light, and samples on each.
-const GLINTS: (usize, usize) = (64, 16);
+const GLINTS: (usize, usize) = (128, 32);
 
 /// For each mode and channel, its share of the added irradiance; channels count by the checkerboard's albedo, relative to
 /// its luminance.
@@ -465,13 +469,13 @@ struct Light {
 
 impl Light {
     fn new(scene: &Scene, field: &Field, bumps: &Bumps, half: f64) -> Self {
-        let field = field.with_lamps_in_the_map();
+        let (lit, field) = (field, field.with_lamps_in_the_map());
         let plane = field.bodies.plane().map_or(0.0, |p| p.0);
         let chi = Functions::new(|u, v| {
             bumps.at(DVec3::new((2.0 * u - 1.0) * half, plane, (2.0 * v - 1.0) * half))
         });
         let own: Vec<Option<[f64; 3]>> = scene.spheres.iter().map(|s| s.diffuse).collect();
-        let white = (0..own.len()).map(|s| own[s].is_none().then(|| field.white_sphere(s))).collect();
+        let white = (0..own.len()).map(|s| own[s].is_none().then(|| lit.white_sphere(s))).collect();
         let returned = (0..own.len()).map(|s| returned(&field, &chi, s)).collect();
         let tint = field.board.as_ref().map_or([1.0; 3], |b| b.tint());
         Self { field, chi, tint, white, own, returned }
@@ -483,8 +487,9 @@ impl Light {
         let mut back =
             NodeReturn { specular: vec![0.0; COUNT * LOBE], diffuse: [0.0; COUNT], own: [[0.0; COUNT]; 3] };
         for sphere in 0..self.own.len() {
-            for (direction, weight) in cone(self.field.bodies.spheres()[sphere], point, seed) {
-                self.add_ray(sphere, point, direction, weight, &mut light, &mut back);
+            for (i, direction, weight) in cone(self.field.bodies.spheres()[sphere], point, seed) {
+                let back = (i % RETURNS == 0).then_some(&mut back);
+                self.add_ray(sphere, point, direction, weight, &mut light, back);
             }
             for source in &self.field.points {
                 self.add_glints(sphere, point, *source, &mut light);
@@ -501,7 +506,7 @@ impl Light {
         direction: DVec3,
         weight: f64,
         light: &mut NodeLight,
-        back: &mut NodeReturn,
+        back: Option<&mut NodeReturn>,
     ) {
         let Some((distance, body)) = self.field.bodies.first(point, direction, Some(Body::Plane)) else {
             return;
@@ -514,30 +519,51 @@ impl Light {
         let place = Place { position, normal, body };
         let view = [View::new(SurfacePoint { place, sphere, wo: -direction })];
         let density = Density { strata: 1, spread: 0.0 };
-        let (moments, functions) = arcs::moments_with(&self.field, &self.chi, &view, density);
+        let (moments, functions) = match &back {
+            Some(_) => arcs::moments_with(&self.field, &self.chi, &view, density),
+            None => (arcs::moments(&self.field, &view, density), Box::default()),
+        };
+        let (u, v) = map_position(normal);
+        if let Some(white) = &self.white[sphere] {
+            let radiance = white.sample(u, v, 1.0);
+            (0..3).for_each(|c| light.diffuse[c] += weight as f32 * radiance[c]);
+        }
         for (angle, share) in angle_position(view[0].angle()) {
             let share = (share * weight) as f32;
             for i in 0..ROW {
-                let (j, k) = (i / FUNCTION_TERMS, i % FUNCTION_TERMS);
-                let place = angle * ROW + i;
-                (0..3).for_each(|c| light.specular[c * LOBE + place] += share * moments[j][k][c]);
-                (0..COUNT).for_each(|a| back.specular[a * LOBE + place] += share * functions[j][k][a]);
+                let moment = &moments[i / FUNCTION_TERMS][i % FUNCTION_TERMS];
+                (0..3).for_each(|c| light.specular[c * LOBE + angle * ROW + i] += share * moment[c]);
             }
         }
-        let (u, v) = map_position(normal);
-        let weight = weight as f32;
-        let returned = self.returned[sphere].at(u, v).map(|e| e * weight / PI as f32);
-        match (&self.white[sphere], self.own[sphere]) {
-            (Some(white), _) => {
-                let radiance = white.sample(u, v, 1.0);
-                (0..3).for_each(|c| light.diffuse[c] += weight * radiance[c]);
-                (0..COUNT).for_each(|a| back.diffuse[a] += returned[a]);
+        if let Some(back) = back {
+            self.add_return(sphere, (u, v), view[0].angle(), weight * f64::from(RETURNS), &functions, back);
+        }
+    }
+
+    /// Adds what a sphere reflects of the functions χ.
+    fn add_return(
+        &self,
+        sphere: usize,
+        (u, v): (f32, f32),
+        theta: f64,
+        weight: f64,
+        functions: &FunctionMoments,
+        back: &mut NodeReturn,
+    ) {
+        for (angle, share) in angle_position(theta) {
+            let share = (share * weight) as f32;
+            for i in 0..ROW {
+                let moment = &functions[i / FUNCTION_TERMS][i % FUNCTION_TERMS];
+                (0..COUNT).for_each(|a| back.specular[a * LOBE + angle * ROW + i] += share * moment[a]);
             }
-            (None, Some(albedo)) => {
+        }
+        let returned = self.returned[sphere].at(u, v).map(|e| e * weight as f32 / PI as f32);
+        match self.own[sphere] {
+            None => (0..COUNT).for_each(|a| back.diffuse[a] += returned[a]),
+            Some(albedo) => {
                 (0..3)
                     .for_each(|c| (0..COUNT).for_each(|a| back.own[c][a] += albedo[c] as f32 * returned[a]));
             }
-            (None, None) => {}
         }
     }
 
@@ -613,36 +639,39 @@ impl Light {
     }
 }
 
-/// Directions from a point of the checkerboard that cover a sphere, each with its projected solid angle.
-fn cone((centre, radius): (DVec3, f64), point: DVec3, seed: u32) -> impl Iterator<Item = (DVec3, f64)> {
+/// Directions from a point of the checkerboard that cover a sphere, each with its number and projected solid angle.
+fn cone((centre, radius): (DVec3, f64), point: DVec3, seed: u32) -> impl Iterator<Item = (u32, DVec3, f64)> {
     let to_centre = centre - point;
     let distance = to_centre.length().max(radius * (1.0 + 1e-9));
     let least = (1.0 - (radius / distance).powi(2)).sqrt();
     let axis = to_centre.normalize();
     let (tangent, bitangent) = frame(axis);
     let shift = zero_two(seed);
-    let solid_angle = TAU * (1.0 - least) / f64::from(RAYS);
-    (0..RAYS).filter_map(move |i| {
+    let rays = if distance < FAR * radius { RAYS[0] } else { RAYS[1] };
+    let solid_angle = TAU * (1.0 - least) / f64::from(rays);
+    (0..rays).filter_map(move |i| {
         let [u, v] = zero_two(i);
         let cos = 1.0 - (u + shift[0]).fract() * (1.0 - least);
         let sin = (1.0 - cos * cos).sqrt();
         let (s, c) = (TAU * (v + shift[1])).sin_cos();
         let direction = axis * cos + (tangent * c + bitangent * s) * sin;
-        (direction.y > 0.0).then_some((direction, direction.y * solid_angle))
+        (direction.y > 0.0).then_some((i, direction, direction.y * solid_angle))
     })
 }
 
-/// The normal of the sphere at the point that mirrors `source` towards `point`.
+/// The normal of the sphere at the point that mirrors `source` towards `point`: it lies between the directions to both,
+/// where they are seen under equal angles.
 fn mirror_point(centre: DVec3, radius: f64, point: DVec3, source: DVec3) -> DVec3 {
-    let mut normal =
-        ((point - centre).normalize() + (source - centre).normalize()).try_normalize().unwrap_or(DVec3::Y);
-    // The half vector at a guess is the next guess: it converges for points outside the sphere.
-    for _ in 0..30 {
-        let position = centre + normal * radius;
-        let half = (point - position).normalize() + (source - position).normalize();
-        normal = half.try_normalize().unwrap_or(normal);
+    let (from, to) = ((point - centre).normalize(), (source - centre).normalize());
+    let cosine = |normal: DVec3, seen: DVec3| normal.dot((seen - centre - normal * radius).normalize());
+    let (mut low, mut high) = (0.0, 1.0);
+    let at = |t: f64| from.lerp(to, t).try_normalize().unwrap_or(DVec3::Y);
+    for _ in 0..40 {
+        let middle = (low + high) / 2.0;
+        let normal = at(middle);
+        if cosine(normal, point) > cosine(normal, source) { low = middle } else { high = middle }
     }
-    normal
+    at((low + high) / 2.0)
 }
 
 /// The tabulated angles around one, with their weights.

@@ -9,6 +9,7 @@ use glam::DVec3;
 use lookmatch_imaging::Image;
 
 use crate::angles::{map_direction, map_position};
+use crate::irradiance::SkyLights;
 use crate::pyramid::Pyramid;
 use crate::scene::EnvironmentLight;
 use crate::{Rgb, SceneError, designed_map};
@@ -16,8 +17,8 @@ use crate::{Rgb, SceneError, designed_map};
 /// The map that ships with the program (CC0, see `assets/README.md`).
 const INTERIOR: &[u8] = include_bytes!("../assets/interior.exr");
 
-/// The map is cut in two this often to give the lights of irradiance: 2048 of them.
-const LIGHT_CUTS: u32 = 11;
+/// The map is cut in two this often to give the lights of irradiance: 8192 of them.
+const LIGHT_CUTS: u32 = 13;
 
 /// A texel brighter than this many times the mean radiance is a lamp.
 const LAMP: f64 = 30.0;
@@ -35,8 +36,8 @@ pub struct EnvironmentMap {
     pub(crate) lamps: Vec<(DVec3, Rgb)>,
     /// Rotation in turns.
     pub(crate) rotation: f32,
-    /// Directions, each with its irradiance on a surface that faces it: all of the map's light.
-    pub(crate) lights: Vec<(DVec3, Rgb)>,
+    /// All of the map's light.
+    pub(crate) lights: SkyLights,
 }
 
 impl EnvironmentMap {
@@ -64,7 +65,7 @@ impl EnvironmentMap {
         let (width, height) = (image.width(), image.height());
         let rotation = (rotation / 360.0).rem_euclid(1.0);
         let grid = Grid { width, height, rotation };
-        let lights = cut_lights(&grid, &texels);
+        let lights = SkyLights::new(&cut_lights(&grid, &texels));
         let (dimmed, lamps) = take_lamps(&grid, &texels);
         let pyramid = |texels| Pyramid::new(width, height, texels, true, |v| (PI * v).sin());
         let (pyramid, dimmed) = (pyramid(texels), pyramid(dimmed));
@@ -222,6 +223,8 @@ fn median(range: Range<usize>, weight: impl Fn(usize) -> f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bodies::{Bodies, Body};
+    use crate::irradiance::Place;
 
     #[test]
     fn orientation_is_canonical() {
@@ -239,7 +242,8 @@ mod tests {
     fn a_black_map_gives_no_light() {
         let map = EnvironmentMap::new(&Image::new(16, 8), 1.0, 0.0);
         assert!(map.lamps.is_empty());
-        assert!(map.lights.iter().all(|(direction, power)| direction.is_finite() && *power == Rgb::ZERO));
+        let up = Place { position: DVec3::ZERO, normal: DVec3::Y, body: Body::Plane };
+        assert_eq!(map.lights.irradiance(&Bodies::default(), &up), Rgb::ZERO);
         assert_eq!(map.dimmed_radiance(DVec3::X, 0.1), Rgb::ZERO);
     }
 
@@ -258,7 +262,8 @@ mod tests {
     #[test]
     fn lights_integrate_the_map() {
         let map = EnvironmentMap::new(&designed_map(), 1.0, 30.0);
-        let upper: Rgb = map.lights.iter().filter(|l| l.0.y > 0.0).map(|l| l.1 * l.0.y as f32).sum();
+        let up = Place { position: DVec3::ZERO, normal: DVec3::Y, body: Body::Plane };
+        let upper = map.lights.irradiance(&Bodies::default(), &up);
         // Every channel is bright in 2 of 5 bands of equal size: E = π (2·2.5 + 3·0.03)/5.
         let exact = std::f32::consts::PI * (2.0 * 2.5 + 3.0 * 0.03) / 5.0;
         assert!((upper / exact - Rgb::new(1.0, 1.0, 1.0, 0.0)).abs().max_element() < 0.01, "{upper} {exact}");

@@ -6,9 +6,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::angles::{map_direction, map_position};
+use crate::arcs;
 use crate::bodies::{Bodies, Body};
 use crate::environment::EnvironmentMap;
-use crate::irradiance::{Place, from_bodies, from_environment, from_point};
+use crate::irradiance::{Place, from_point};
 use crate::plane::Board;
 use crate::pyramid::Pyramid;
 use crate::scene::{Illumination, Scene};
@@ -68,9 +69,12 @@ impl Field {
 
     /// Irradiance from everything but the point lights.
     pub(crate) fn smooth_irradiance(&self, place: &Place) -> Rgb {
-        let sky = self.environment.as_ref().map(|e| from_environment(&self.bodies, e, place));
-        let bodies = self.board.is_some() || self.spheres.iter().any(Option::is_some);
-        sky.unwrap_or(Rgb::ZERO) + if bodies { from_bodies(self, place) } else { Rgb::ZERO }
+        let sky = self.environment.as_ref().map_or(Rgb::ZERO, |e| e.lights.irradiance(&self.bodies, place));
+        if self.board.is_none() && self.spheres.iter().all(Option::is_none) {
+            return sky;
+        }
+        let [r, g, b, _] = arcs::from_bodies(self, place);
+        sky + Rgb::new(r, g, b, 0.0)
     }
 
     /// Radiance that arrives at a place from a unit direction, averaged over about `angle` radians. Point lights have

@@ -10,6 +10,9 @@ use crate::scene::Camera;
 /// Sub-pixel samples of every pixel.
 pub(crate) const SUBSAMPLES: u32 = 16;
 
+/// Sub-pixel samples of pixels that see more than one thing.
+pub(crate) const EDGE_SUBSAMPLES: u32 = 256;
+
 /// A pinhole camera with a square film.
 #[derive(Clone, Debug)]
 pub(crate) struct Film {
@@ -81,6 +84,18 @@ impl Film {
     /// left out.
     pub(crate) fn subject_points(&self, bodies: &Bodies, pixel: usize, count: u32) -> Vec<SurfacePoint> {
         self.directions(pixel, count).filter_map(|d| self.subject_point(bodies, d)).collect()
+    }
+
+    /// The points of subjects seen in a pixel, and the number of positions that were looked through: more of them where
+    /// the pixel shows other things too.
+    pub(crate) fn points(&self, bodies: &Bodies, pixel: usize) -> (Vec<SurfacePoint>, u32) {
+        let points = self.subject_points(bodies, pixel, SUBSAMPLES);
+        let is_whole =
+            points.len() == SUBSAMPLES as usize && points.iter().all(|p| p.sphere == points[0].sphere);
+        if is_whole || points.is_empty() {
+            return (points, SUBSAMPLES);
+        }
+        (self.subject_points(bodies, pixel, EDGE_SUBSAMPLES), EDGE_SUBSAMPLES)
     }
 
     fn subject_point(&self, bodies: &Bodies, direction: DVec3) -> Option<SurfacePoint> {

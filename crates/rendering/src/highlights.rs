@@ -86,7 +86,7 @@ fn tan2_h(point: &SurfacePoint, direction: DVec3) -> f64 {
 fn pixel_samples(field: &Field, film: &Film, pixel: usize) -> Vec<Sample> {
     let points = film.subject_points(&field.bodies, pixel, SUBSAMPLES);
     let width = width(&points);
-    let mut samples = Vec::new();
+    let mut samples: Vec<Sample> = Vec::new();
     for light in &field.points {
         let sees = |points: &[SurfacePoint]| -> Vec<Lit> {
             let lit = |p: &SurfacePoint| {
@@ -107,6 +107,10 @@ fn pixel_samples(field: &Field, film: &Film, pixel: usize) -> Vec<Sample> {
         }
     }
     samples.extend(lamp_samples(field, &points, width));
+    // Along silhouettes the few points count for as much of the pixel as many cover.
+    let (all, count) = film.points(&field.bodies, pixel);
+    let share = all.len() as f32 / count as f32 * SUBSAMPLES as f32 / points.len().max(1) as f32;
+    samples.iter_mut().for_each(|(_, irradiance)| *irradiance *= share);
     samples
 }
 

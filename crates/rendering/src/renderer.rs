@@ -309,15 +309,14 @@ fn seen_modes(field: &Field, film: &Film, bounce: &Bounce) -> Vec<(u32, [f32; MO
 /// What every pixel sees beside the subjects, and which pixels see a subject.
 fn look(field: &Field, film: &Film) -> (Vec<Rgb>, Vec<bool>) {
     let pixel = |pixel: usize| {
+        let (points, count) = film.points(&field.bodies, pixel);
         let mut sum = Rgb::ZERO;
-        let mut hit = false;
-        for direction in film.directions(pixel, SUBSAMPLES) {
-            match field.bodies.first(film.eye, direction, None) {
-                Some((_, Body::Sphere(_))) => hit = true,
-                _ => sum += field.background(film.eye, direction, film.sample_angle()),
+        for direction in film.directions(pixel, count) {
+            if !matches!(field.bodies.first(film.eye, direction, None), Some((_, Body::Sphere(_)))) {
+                sum += field.background(film.eye, direction, film.sample_angle());
             }
         }
-        (sum / SUBSAMPLES as f32, hit)
+        (sum / count as f32, !points.is_empty())
     };
     (0..film.size * film.size).into_par_iter().map(pixel).unzip()
 }
@@ -331,7 +330,7 @@ fn diffuse_light(
     bounce: Option<&Bounce>,
     pixel: usize,
 ) -> DiffuseLight {
-    let points = film.subject_points(&field.bodies, pixel, SUBSAMPLES);
+    let (points, count) = film.points(&field.bodies, pixel);
     let mut light = DiffuseLight::default();
     for (sphere, description) in scene.spheres.iter().enumerate() {
         let here: Vec<&SurfacePoint> = points.iter().filter(|p| p.sphere == sphere).collect();
@@ -340,8 +339,8 @@ fn diffuse_light(
         let mean = Place { position: field.bodies.point(sphere, normal), normal, body: first.place.body };
         let sharp: Rgb = here.iter().map(|p| field.point_irradiance(&p.place)).sum();
         let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
-        let radiance = irradiance / (SUBSAMPLES as f32 * PI);
-        let share = here.len() as f32 / SUBSAMPLES as f32;
+        let radiance = irradiance / (count as f32 * PI);
+        let share = here.len() as f32 / count as f32;
         match description.diffuse {
             Some(own) => {
                 (light.own, light.own_share) =

@@ -3,9 +3,16 @@
 use glam::DVec3;
 
 use crate::field::Field;
-use crate::film::{Film, SUBSAMPLES, SurfacePoint};
+use crate::film::{Film, SurfacePoint};
+use crate::product::LANES;
+
+/// Range of angles of view, in radians, that one row stands for.
+const NARROW: f64 = 0.05;
+/// Rows of a pixel with a wider range.
+const PARTS: usize = 4;
 
 /// A sub-pixel point with the frame whose tangent lies in the plane of its view.
+#[derive(Clone, Copy)]
 pub(crate) struct View {
     pub(crate) point: SurfacePoint,
     pub(crate) frame: [DVec3; 3],
@@ -26,11 +33,6 @@ impl View {
     }
 }
 
-/// Range of angles of view, in radians, that one row stands for.
-const NARROW: f64 = 0.05;
-/// Sub-pixel points that share a row in pixels with a wider range.
-const GROUP: usize = 4;
-
 /// The sub-pixel points of one pixel that are seen under about the same angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Row {
@@ -39,6 +41,8 @@ pub(crate) struct Row {
     part: u32,
     /// Mean angle of view, in radians.
     pub(crate) theta: f64,
+    /// Share of the pixel that it covers.
+    pub(crate) coverage: f32,
 }
 
 /// The rows of a picture: the first of every subject pixel, then those that some pixels have more; each part sorted by
@@ -55,13 +59,13 @@ impl Rows {
     pub(crate) fn new(field: &Field, film: &Film, pixels: &[u32]) -> Self {
         use rayon::prelude::*;
         let of_pixel = |pixel: &u32| -> Vec<Row> {
-            let parts = parts(field, film, *pixel);
-            let row = |(part, views): (usize, &Vec<View>)| Row {
+            let row = |(part, (views, coverage)): (usize, (Vec<View>, f32))| Row {
                 pixel: *pixel,
                 part: part as u32,
-                theta: mean_angle(views),
+                theta: mean_angle(&views),
+                coverage,
             };
-            parts.iter().enumerate().map(row).collect()
+            parts(field, film, *pixel).into_iter().enumerate().map(row).collect()
         };
         let rows: Vec<Vec<Row>> = pixels.par_iter().map(of_pixel).collect();
         let (mut main, mut more): (Vec<Row>, Vec<Row>) =
@@ -77,25 +81,27 @@ impl Rows {
 impl Row {
     /// The points that the row stands for.
     pub(crate) fn views(&self, field: &Field, film: &Film) -> Vec<View> {
-        parts(field, film, self.pixel).swap_remove(self.part as usize)
+        parts(field, film, self.pixel).swap_remove(self.part as usize).0
     }
 }
 
-/// The points of a pixel, in the groups that share a row.
-fn parts(field: &Field, film: &Film, pixel: u32) -> Vec<Vec<View>> {
-    let mut views: Vec<View> =
-        film.subject_points(&field.bodies, pixel as usize, SUBSAMPLES).into_iter().map(View::new).collect();
+/// The points of a pixel, in the groups that share a row, each with the share of the pixel that it covers.
+fn parts(field: &Field, film: &Film, pixel: u32) -> Vec<(Vec<View>, f32)> {
+    let (points, count) = film.points(&field.bodies, pixel as usize);
+    let mut views: Vec<View> = points.into_iter().map(View::new).collect();
     let angles = || views.iter().map(View::angle);
     let (least, most) = (angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max));
-    if most - least <= NARROW {
-        return vec![views];
-    }
+    let parts = if most - least <= NARROW { 1 } else { PARTS };
     views.sort_by(|a, b| a.angle().total_cmp(&b.angle()));
-    let mut parts = Vec::new();
-    while !views.is_empty() {
-        parts.push(views.drain(..GROUP.min(views.len())).collect());
-    }
-    parts
+    let size = views.len().div_ceil(parts).max(1);
+    let part = |views: &[View]| (thinned(views), views.len() as f32 / count as f32);
+    if views.is_empty() { vec![(Vec::new(), 0.0)] } else { views.chunks(size).map(part).collect() }
+}
+
+/// As many of some points as there are lanes, evenly spread.
+fn thinned(views: &[View]) -> Vec<View> {
+    let count = views.len().min(LANES);
+    (0..count).map(|k| views[k * views.len() / count]).collect()
 }
 
 fn mean_angle(views: &[View]) -> f64 {

@@ -10,7 +10,7 @@ use crate::Rgb;
 use crate::arcs::{self, Density, FUNCTION_TERMS};
 use crate::bounce::{Bounce, MODES, Weights};
 use crate::field::Field;
-use crate::film::{Film, SUBSAMPLES};
+use crate::film::Film;
 use crate::highlights::is_near_lamp;
 use crate::lobe_table::LobeTable;
 use crate::product::{self, GROUP, LANES, Lanes, Moments, Reflected};
@@ -142,7 +142,7 @@ impl Bundle {
         let mut reflected = bounce.map(|_| Box::new(Reflected::default()));
         for (lane, row) in rows.iter().enumerate() {
             let views = row.views(field, film);
-            let sums = gather_row(field, &views);
+            let sums = gather_row(field, &views, row.coverage);
             if let (Some(bounce), Some(reflected)) = (bounce, &mut reflected) {
                 reflected.set(lane, &sums, field, bounce, &views);
             }
@@ -177,19 +177,18 @@ impl Reflected {
     }
 }
 
-/// The moments of some of the [`SUBSAMPLES`] points of a pixel.
-fn gather_row(field: &Field, points: &[View]) -> arcs::Moments {
+/// The moments of some points that cover a share of a pixel.
+fn gather_row(field: &Field, points: &[View], coverage: f32) -> arcs::Moments {
     let density = Density { strata: STRATA, spread: normal_spread(points) as f32 };
     let mut moments = arcs::moments(field, points, density);
-    let coverage = points.len() as f32 / SUBSAMPLES as f32;
     moments.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|m| *m *= coverage);
-    add_lamps(field, points, &mut moments);
+    add_lamps(field, points, coverage, &mut moments);
     moments
 }
 
 /// Adds the environment's lamps, each a single direction, but for those that are evaluated as highlights: `dω_i = 4 cos_d sin θ_h dθ_h dφ_h` turns its irradiance into
 /// moments.
-fn add_lamps(field: &Field, points: &[View], moments: &mut arcs::Moments) {
+fn add_lamps(field: &Field, points: &[View], coverage: f32, moments: &mut arcs::Moments) {
     for view in points {
         let far = |(direction, _): &(DVec3, Rgb)| !is_near_lamp(&view.point, *direction);
         for (direction, irradiance) in field.lamps(view.point.place).filter(far) {
@@ -198,7 +197,7 @@ fn add_lamps(field: &Field, points: &[View], moments: &mut arcs::Moments) {
             let sin_h = (1.0 - cos_h * cos_h).sqrt();
             let Some(ring) = Ring::new((view.cosine, view.sine), (cos_h, sin_h)) else { continue };
             let cos_d = view.point.wo.dot(h);
-            let density = 4.0 * cos_d * sin_h * f64::from(SUBSAMPLES);
+            let density = 4.0 * cos_d * sin_h * points.len() as f64 / f64::from(coverage);
             let (interval, hat) = hat_position(sin_h.atan2(cos_h));
             for (k, t) in chebyshev(ring.position(cos_d)).into_iter().enumerate() {
                 let moment = irradiance * (t / density) as f32;

@@ -155,7 +155,8 @@ impl PathTracer {
             let Some(at) = self.world.first(vertex.at.position, direction, Some(vertex.at.surface)) else {
                 if let Some(sky) = &self.sky {
                     sum += scattering.value * sky.radiance(direction)
-                        / (scattering.density + sky.density(direction)) / f64::from(splits);
+                        / (scattering.density + sky.density(direction))
+                        / f64::from(splits);
                 }
                 continue;
             };

@@ -4,7 +4,6 @@ use lookmatch_imaging::{delta_e76, lab_from_linear_srgb};
 
 use super::*;
 
-
 /// Side of the pictures. Large, because what differs is the light within a pixel; few of the pixels are evaluated.
 const SIZE: usize = 200;
 /// Share of the subject pixels that is evaluated.
@@ -173,7 +172,9 @@ fn truth() {
 
 #[test]
 fn against_truth() {
-    if std::env::var("AGAINST").is_err() { return }
+    if std::env::var("AGAINST").is_err() {
+        return;
+    }
     for light in [Illumination::Environment, Illumination::Point] {
         let renderer = Renderer::prepare(&Scene::reference(), light, 300).unwrap();
         let Renderer { field, film, .. } = &renderer;
@@ -185,30 +186,57 @@ fn against_truth() {
         println!("bounce {:.1} s", start.elapsed().as_secs_f64());
         let rows = Rows::new(field, film, &pixels);
         let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
-        let diffuse = subjects.iter().map(|p| diffuse_light(&Scene::reference(), field, film, bounce.as_ref(), *p as usize)).collect();
+        let diffuse = subjects
+            .iter()
+            .map(|p| diffuse_light(&Scene::reference(), field, film, bounce.as_ref(), *p as usize))
+            .collect();
         let highlights = Highlights::prepare(field, film, &subjects);
         let renderer = Renderer { subjects, rows, diffuse, highlights, bounce, ..renderer }.keep_transport();
         for text in TRUE {
             let material = Material::parse(text).unwrap();
             let name = format!("/tmp/truth_{light:?}_{}", text.replace(['/', ':', '='], "_"));
             let Ok(bytes) = std::fs::read(name) else { continue };
-            let truth: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+            let truth: Vec<f32> =
+                bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
             let image = renderer.render(&material, Part::Full);
             let (mut sum, mut max, mut worst) = (0.0, 0.0f64, 0);
             let mut bins = [[0.0; 2]; 6];
             for (pixel, t) in pixels.iter().zip(truth.chunks(3)) {
                 let a = image.pixels()[*pixel as usize].map(f64::from);
-                let d = delta_e76(lab_from_linear_srgb(a), lab_from_linear_srgb([t[0] as f64, t[1] as f64, t[2] as f64]));
+                let d = delta_e76(
+                    lab_from_linear_srgb(a),
+                    lab_from_linear_srgb([t[0] as f64, t[1] as f64, t[2] as f64]),
+                );
                 sum += d;
                 let k = renderer.subjects.iter().position(|s| s == pixel).unwrap();
-                let bin = if renderer.diffuse[k].white_share < 1.0 { 5 } else { ((pixel / 300) as usize).saturating_sub(40) / 40 };
-                bins[bin.min(5)][0] += d; bins[bin.min(5)][1] += 1.0;
-                if d > max { max = d; worst = *pixel; }
+                let bin = if renderer.diffuse[k].white_share < 1.0 {
+                    5
+                } else {
+                    ((pixel / 300) as usize).saturating_sub(40) / 40
+                };
+                bins[bin.min(5)][0] += d;
+                bins[bin.min(5)][1] += 1.0;
+                if d > max {
+                    max = d;
+                    worst = *pixel;
+                }
                 let _ = k;
             }
             let bins: Vec<String> = bins.iter().map(|b| format!("{:.2}", b[0] / b[1])).collect();
-            println!("{light:?} {text}: mean {:.3} max {max:.2} at {},{} by rows {bins:?}", sum / pixels.len() as f64, worst % 300, worst / 300);
+            println!(
+                "{light:?} {text}: mean {:.3} max {max:.2} at {},{} by rows {bins:?}",
+                sum / pixels.len() as f64,
+                worst % 300,
+                worst / 300
+            );
         }
     }
 }
-const TRUE: [&str; 6] = ["ggx:roughness=0.1", "lambert:diffuse=0.5", "ggx-conductor:roughness=0.01","ggx-conductor:eta=0.143/0.375/1.442,k=3.983/2.386/1.603,roughness=0.1","ggx-conductor:roughness=0.3","ward:specular=0.4,roughness=0.2"];
+const TRUE: [&str; 6] = [
+    "ggx:roughness=0.1",
+    "lambert:diffuse=0.5",
+    "ggx-conductor:roughness=0.01",
+    "ggx-conductor:eta=0.143/0.375/1.442,k=3.983/2.386/1.603,roughness=0.1",
+    "ggx-conductor:roughness=0.3",
+    "ward:specular=0.4,roughness=0.2",
+];
