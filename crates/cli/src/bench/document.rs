@@ -1,0 +1,209 @@
+//! The measurements as tables: aligned for a terminal, Markdown for a document.
+
+use super::Report;
+use super::accuracy::MaterialError;
+use super::peer::PeerReport;
+use crate::output::table;
+
+/// A table with its heading, and a remark below it.
+struct Section {
+    title: &'static str,
+    rows: Vec<Vec<String>>,
+    remark: String,
+}
+
+/// The report for a terminal.
+pub(crate) fn plain(report: &Report) -> String {
+    let section = |s: Section| format!("{}\n{}{}\n", s.title, table(&s.rows), remark(&s.remark));
+    sections(report).into_iter().map(section).collect::<Vec<_>>().join("\n")
+}
+
+fn remark(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!("\n{text}\n") }
+}
+
+/// The report as a document.
+pub(crate) fn markdown(report: &Report) -> String {
+    let command = if report.peer.is_some() { " --peer mitsuba" } else { "" };
+    let mut text = format!(
+        "# Performance\n\nMade by `cargo run --release -- bench{command} --output docs/results/performance.md`, which \
+         measures everything anew on the machine that it runs on and installs what it needs. Do not edit.\n"
+    );
+    for section in sections(report) {
+        let rows: Vec<String> =
+            section.rows.iter().map(|cells| format!("| {} |", cells.join(" | "))).collect();
+        let rule = format!("|---|{}", "---:|".repeat(section.rows[0].len() - 1));
+        text += &format!("\n## {}\n\n{}\n{rule}\n{}\n", section.title, rows[0], rows[1..].join("\n"));
+        text += &remark(&section.remark);
+    }
+    text
+}
+
+fn sections(report: &Report) -> Vec<Section> {
+    let mut sections = vec![summary(report)];
+    sections.extend(report.peer.iter().flat_map(|peer| [peer_runs(peer), peer_summary(peer, report)]));
+    sections.push(errors(report));
+    sections.push(conditions(report));
+    sections
+}
+
+fn rows<const N: usize>(header: [&str; N], body: impl IntoIterator<Item = [String; N]>) -> Vec<Vec<String>> {
+    std::iter::once(header.map(str::to_owned)).chain(body).map(Vec::from).collect()
+}
+
+fn summary(report: &Report) -> Section {
+    let (t, a) = (&report.timing, &report.accuracy);
+    let row = |what: &str, value: String| [what.to_owned(), value];
+    let body = [
+        row("picture pair (point light, environment), one of a batch", ms(t.image_pair_cpu_ms)),
+        row("picture pair on its own", ms(t.single_pair_cpu_ms)),
+        row("metal under the environment, one of a batch", ms(t.environment_image_cpu_ms)),
+        row("metal under the environment on its own", ms(t.environment_single_cpu_ms)),
+        row("metric: four pairs of pictures, CIELAB of both sides", ms(t.metric_ms)),
+        row("metric: the same with the CIELAB of one side kept", ms(t.metric_cached_ms)),
+        row(
+            "preparing the scene under both lights",
+            format!("{:.1} CPU s", report.preparation.prepare_cpu_s),
+        ),
+        row("mean ΔE*76 from converged pictures", delta_e(a.mean_delta_e)),
+        row("… of the worst material", delta_e(a.worst_delta_e)),
+        row("… root mean square, free of the converged pictures' noise", delta_e(a.rms_delta_e)),
+        row("… of the converged pictures' noise alone", delta_e(a.noise_delta_e)),
+    ];
+    let remark = format!(
+        "CPU time per picture of {0} × {0} pixels on one thread, from parameters to linear RGB of all the subject's \
+         pixels, the light of the scene prepared; the fastest of {1} runs. A batch has {2} new materials. Preparing \
+         is the CPU time of all threads, with nothing kept from before.",
+        report.effort.size, report.effort.runs, report.effort.batch
+    );
+    Section { title: "Speed and accuracy", rows: rows(["", "measured"], body), remark }
+}
+
+fn errors(report: &Report) -> Section {
+    let body = report.accuracy.materials.iter().map(|m: &MaterialError| {
+        let [point, environment] = [&m.point, &m.environment];
+        [
+            m.name.clone(),
+            delta_e(point.mean_delta_e),
+            delta_e(point.noise_delta_e),
+            delta_e(environment.mean_delta_e),
+            delta_e(environment.noise_delta_e),
+            percent(environment.relative_rmse),
+        ]
+    });
+    let header = ["material", "point ΔE", "noise", "environment ΔE", "noise", "relative RMSE"];
+    let remark = format!(
+        "Mean ΔE*76 between our pictures and converged ones, the mean of two path traced pictures with {} paths per \
+         pixel each and different random numbers; their own noise is given beside it and is part of the figures. \
+         Measured on {} pixels spread evenly over the sphere, its silhouette included; full light transport on the \
+         converged side.",
+        report.effort.samples, report.effort.pixels
+    );
+    Section { title: "Errors by material", rows: rows(header, body), remark }
+}
+
+fn peer_runs(peer: &PeerReport) -> Section {
+    let body = peer.runs.iter().map(|run| {
+        [
+            run.samples.to_string(),
+            format!("{:.2}", run.cpu_s),
+            format!("{:.2}", run.wall_s),
+            percent(run.relative_rmse),
+            delta_e(run.mean_delta_e),
+        ]
+    });
+    let variants: Vec<String> = peer
+        .variants
+        .iter()
+        .map(|v| format!("{} {:.2} CPU s at {} samples", v.name, v.cpu_s, v.samples))
+        .collect();
+    let remark = format!(
+        "{} {}, variant {} (tried: {}), sampler {}, path integrator with all bounces, box filter, one picture under the \
+         environment of {}. Compilation and first pictures are left out. The error is noise alone, as seen between two \
+         pictures; it falls with the number of samples to the power of {:.2}. {} pictures were rendered.",
+        peer.name,
+        peer.version,
+        peer.variant,
+        variants.join(", "),
+        peer.sampler,
+        peer.material_name,
+        peer.exponent,
+        peer.images
+    );
+    let header = ["samples per pixel", "CPU s", "wall s", "relative RMSE", "mean ΔE"];
+    Section { title: "The peer", rows: rows(header, body), remark }
+}
+
+fn peer_summary(peer: &PeerReport, report: &Report) -> Section {
+    let row = |what: &str, value: String| [what.to_owned(), value];
+    let (ours, bias) = (&peer.ours, &peer.bias);
+    let body = [
+        row("our relative RMSE, the converged picture's noise included", percent(ours.relative_rmse)),
+        row("… of that noise alone", percent(ours.relative_noise)),
+        row("our mean ΔE", delta_e(ours.mean_delta_e)),
+        row("our CPU time, one of a batch", ms(report.timing.environment_image_cpu_ms)),
+        row(
+            "the peer's samples per pixel for our RMSE, extrapolated",
+            format!("{:.0}", peer.equal_error_samples),
+        ),
+        row("the peer's CPU time for our RMSE, extrapolated", format!("{:.0} s", peer.equal_error_cpu_s)),
+        row("**ratio at equal RMSE**, a picture of a batch", ratio(peer.equal_error_ratio)),
+        row("ratio at equal RMSE, a picture on its own", ratio(peer.equal_error_ratio_single)),
+        row("ratio at equal mean ΔE, a picture of a batch", ratio(peer.equal_delta_e_ratio)),
+        row(
+            "bias: the peer's best pictures, brightness over converged",
+            format!("{:+.3} %", 100.0 * bias.brightness),
+        ),
+        row("bias: root mean square ΔE, free of noise", delta_e(bias.rms_delta_e)),
+    ];
+    let remark =
+        "Extrapolated with the square root of the number of samples from the run with the most. The peer's \
+                  systematic difference from our path tracer (bias) is not held against it."
+            .to_owned();
+    Section { title: "At equal error", rows: rows(["", "measured"], body), remark }
+}
+
+fn conditions(report: &Report) -> Section {
+    let m = &report.machine;
+    let row = |what: &str, value: String| [what.to_owned(), value];
+    let scene = &report.scene;
+    let mut body = vec![
+        row("processor", m.cpu.clone()),
+        row("cores", m.cores.to_string()),
+        row("instruction set", m.instruction_set.to_owned()),
+        row("system", m.system.clone()),
+        row("lookmatch", report.version.to_owned()),
+        row(
+            "scene",
+            format!(
+                "{} ({} sphere, checkerboard, point light, environment map)",
+                scene.name,
+                scene.spheres.len()
+            ),
+        ),
+        row("picture", format!("{0} × {0} pixels", report.effort.size)),
+        row("materials", report.accuracy.materials.len().to_string()),
+    ];
+    if let Some(peer) = &report.peer {
+        body.push(row("peer", format!("{} {}", peer.name, peer.version)));
+        body.push(row("LLVM of the peer", peer.llvm.clone().unwrap_or_else(|| "none".into())));
+    }
+    Section { title: "Conditions", rows: rows(["", ""], body), remark: String::new() }
+}
+
+fn ms(value: f64) -> String {
+    format!("{value:.3} ms")
+}
+
+fn delta_e(value: f64) -> String {
+    format!("{value:.3}")
+}
+
+fn percent(value: f64) -> String {
+    format!("{:.3} %", 100.0 * value)
+}
+
+/// Two digits are more than an extrapolation holds.
+fn ratio(value: f64) -> String {
+    format!("{value:.1e}")
+}
