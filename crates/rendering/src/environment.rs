@@ -81,6 +81,11 @@ impl EnvironmentMap {
         self.look_up(&self.dimmed, direction, angle)
     }
 
+    /// Rows of the map, and its rotation in turns.
+    pub(crate) fn grid(&self) -> (usize, f64) {
+        (self.pyramid.height(), self.rotation.into())
+    }
+
     fn look_up(&self, pyramid: &Pyramid, direction: DVec3, angle: f64) -> Rgb {
         let (mut u, v) = map_position(direction);
         u -= self.rotation;

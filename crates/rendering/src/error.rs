@@ -68,4 +68,24 @@ pub enum SceneError {
         /// The side asked for.
         size: usize,
     },
+    /// A mesh cannot be used.
+    #[error("mesh '{}': {message}", path.display())]
+    Mesh {
+        /// Its file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The scene has meshes, but the renderer knows spheres alone.
+    #[error("scene '{scene}' has meshes; the renderer 'transport' takes spheres alone, the renderer 'path' takes both")]
+    NeedsPath {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// No samples in a pixel, or more than fit.
+    #[error("{samples} samples per pixel cannot be taken; 1 to 1048576 can")]
+    Samples {
+        /// The number asked for.
+        samples: u32,
+    },
 }

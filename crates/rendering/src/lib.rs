@@ -1,4 +1,7 @@
-//! Scenes of spheres on a checkerboard, and the built-in, noise-free renderer of them.
+//! Scenes of spheres and meshes on a checkerboard, and two renderers of them behind one interface ([`Render`]): a fast,
+//! noise-free one for searches ([`Renderer`], spheres alone) and a slow, exact one ([`PathTracer`]).
+//!
+//! # The noise-free renderer
 //!
 //! Nothing in such a scene changes from picture to picture but the material of the spheres. So the light that reaches
 //! each visible point is prepared once ([`Renderer::prepare`]) and each further picture is a short weighted sum per pixel.
@@ -21,8 +24,11 @@ mod gather;
 mod highlights;
 mod irradiance;
 mod lobe_table;
+mod mesh;
+mod path_tracer;
 mod plane;
 mod pyramid;
+mod render;
 mod renderer;
 mod rings;
 mod sampling;
@@ -32,8 +38,10 @@ mod transport;
 pub use designed_map::designed_map;
 pub use environment::EnvironmentMap;
 pub use error::SceneError;
+pub use path_tracer::PathTracer;
+pub use render::{RENDERERS, Render, RendererEntry};
 pub use renderer::{Part, Renderer};
-pub use scene::{Camera, EnvironmentLight, Illumination, Plane, PointLight, Scene, Sphere};
+pub use scene::{Camera, EnvironmentLight, Illumination, Mesh, Plane, PointLight, Scene, Sphere};
 
 /// A linear RGB value in the first three lanes.
 pub(crate) type Rgb = glam::Vec4;

@@ -18,7 +18,6 @@ const GRID: usize = 192;
 #[derive(Clone, Debug)]
 pub(crate) struct Board {
     plane: Plane,
-    albedo: [Rgb; 2],
     /// Irradiance that varies smoothly: everything but the point lights.
     smooth: Pyramid,
     /// Outgoing radiance, all lights.
@@ -36,7 +35,6 @@ impl Board {
         let grid = tabulate(plane, GRID, smooth);
         let mut board = Self {
             plane: plane.clone(),
-            albedo: [rgb(plane.light), rgb(plane.dark)],
             smooth: grid,
             radiance: Pyramid::new(1, 1, vec![Rgb::ZERO], false, |_| 1.0),
         };
@@ -52,7 +50,7 @@ impl Board {
     /// Radiance of a point for a given irradiance from the point lights.
     pub(crate) fn exact(&self, point: DVec3, sharp: Rgb) -> Rgb {
         let (u, v) = self.position(point);
-        self.albedo_at(point) * (self.smooth.sample(u, v, 1.0) + sharp) / PI
+        rgb(self.plane.albedo(point)) * (self.smooth.sample(u, v, 1.0) + sharp) / PI
     }
 
     /// Radiance averaged over a footprint of `width` metres.
@@ -60,11 +58,6 @@ impl Board {
         let (u, v) = self.position(point);
         let texels = width * TEXELS as f64 / (2.0 * self.plane.half_extent);
         self.radiance.sample(u, v, texels as f32)
-    }
-
-    fn albedo_at(&self, point: DVec3) -> Rgb {
-        let check = |x: f64| (x / self.plane.check_size).floor() as i64;
-        self.albedo[(check(point.x) + check(point.z)).rem_euclid(2) as usize]
     }
 
     fn position(&self, point: DVec3) -> (f32, f32) {

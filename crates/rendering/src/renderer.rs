@@ -66,18 +66,9 @@ impl Renderer {
     /// # Errors
     /// Where the scene lacks the light that is asked for, or its environment map cannot be read.
     pub fn prepare(scene: &Scene, illumination: Illumination, size: usize) -> Result<Self, SceneError> {
-        scene.check()?;
-        if !(1..=8192).contains(&size) {
-            return Err(SceneError::Size { size });
-        }
-        let missing = |light| Err(SceneError::NoLight { scene: scene.name.clone(), light });
-        match illumination {
-            Illumination::Point if scene.point_lights.is_empty() => return missing("point light"),
-            Illumination::Environment if scene.environment.is_none() => return missing("environment"),
-            Illumination::All if scene.point_lights.is_empty() && scene.environment.is_none() => {
-                return missing("light");
-            }
-            _ => {}
+        scene.check_picture(illumination, size)?;
+        if !scene.meshes.is_empty() {
+            return Err(SceneError::NeedsPath { scene: scene.name.clone() });
         }
         let field = Field::bake(scene, illumination)?;
         let film = Film::new(&scene.camera, size);
@@ -218,12 +209,13 @@ impl Renderer {
 }
 
 impl Scene {
-    /// The scene as materials of a model see it: without diffuse colours of the spheres where the model has no diffuse
+    /// The scene as materials of a model see it: without diffuse colours of the subjects where the model has no diffuse
     /// reflectance.
     pub fn for_model(&self, model: &lookmatch_materials::Model) -> Self {
         let mut scene = self.clone();
         if !model.parameters.iter().any(|p| p.role == Role::DiffuseReflectance) {
             scene.spheres.iter_mut().for_each(|s| s.diffuse = None);
+            scene.meshes.iter_mut().for_each(|m| m.diffuse = None);
         }
         scene
     }

@@ -1,4 +1,4 @@
-//! Scenes as data: camera, spheres, an optional checkerboard, point lights, an environment. Y is up, units are metres.
+//! Scenes as data: camera, spheres and meshes, an optional checkerboard, point lights, an environment. Y is up, units are metres.
 
 use std::path::{Path, PathBuf};
 
@@ -15,9 +15,12 @@ pub struct Scene {
     pub name: String,
     /// The pinhole camera.
     pub camera: Camera,
-    /// The subjects: all of them wear the material that is rendered.
-    #[serde(rename = "sphere")]
+    /// Subjects: all of them wear the material that is rendered.
+    #[serde(default, rename = "sphere", skip_serializing_if = "Vec::is_empty")]
     pub spheres: Vec<Sphere>,
+    /// Further subjects, for the path renderer alone.
+    #[serde(default, rename = "mesh", skip_serializing_if = "Vec::is_empty")]
+    pub meshes: Vec<Mesh>,
     /// A horizontal, diffuse checkerboard.
     #[serde(default)]
     pub plane: Option<Plane>,
@@ -74,6 +77,27 @@ pub struct Sphere {
     pub centre: [f64; 3],
     /// Radius in metres, above 0.
     pub radius: f64,
+    /// A diffuse reflectance of its own (linear RGB) instead of the material's, for materials that have one.
+    #[serde(default, deserialize_with = "optional_vector")]
+    pub diffuse: Option<[f64; 3]>,
+}
+
+/// A triangle mesh. Its tangent runs along growing texture coordinate u where the file has texture coordinates, else
+/// eastwards as that of a sphere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mesh {
+    /// Path of an .obj or .ply file.
+    pub file: String,
+    /// Where the origin of the file's coordinates lies, in metres.
+    #[serde(deserialize_with = "vector")]
+    pub centre: [f64; 3],
+    /// Metres per unit of the file, above 0.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Turn about the y axis in degrees; positive moves what is at −Z towards +X.
+    #[serde(default)]
+    pub rotation: f64,
     /// A diffuse reflectance of its own (linear RGB) instead of the material's, for materials that have one.
     #[serde(default, deserialize_with = "optional_vector")]
     pub diffuse: Option<[f64; 3]>,
@@ -166,6 +190,7 @@ impl Scene {
             name: "reference".into(),
             camera: Camera { eye: [0.0, 1.5, 6.0], target: [0.0, -0.1, 0.0], up: up(), vertical_fov: 28.0 },
             spheres: vec![Sphere { centre: [0.0; 3], radius: 1.0, diffuse: None }],
+            meshes: Vec::new(),
             plane: Some(checkerboard(4.0)),
             point_lights: vec![PointLight { position: [-3.0, 4.0, 4.0], intensity: [60.0; 3] }],
             environment: Some(EnvironmentLight::of("designed")),
@@ -185,6 +210,7 @@ impl Scene {
                 sphere(0.0, 0.0, [0.10, 0.38, 0.12]),
                 sphere(2.1, 0.0, [0.08, 0.14, 0.45]),
             ],
+            meshes: Vec::new(),
             plane: Some(checkerboard(8.0)),
             point_lights: vec![PointLight { position: [-4.0, 5.0, 5.0], intensity: [25.0; 3] }],
             // Scaled so that a white surface on the table is just white.
@@ -214,11 +240,12 @@ impl Scene {
         if scene.name.is_empty() {
             scene.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         }
-        // A map is named relative to the scene file, as any asset of a scene is.
-        if let Some(environment) = &mut scene.environment {
-            let beside: PathBuf = path.parent().unwrap_or(Path::new("")).join(&environment.map);
+        // Maps and meshes are named relative to the scene file, as any asset of a scene is.
+        let maps = scene.environment.iter_mut().map(|e| &mut e.map);
+        for file in maps.chain(scene.meshes.iter_mut().map(|m| &mut m.file)) {
+            let beside: PathBuf = path.parent().unwrap_or(Path::new("")).join(&*file);
             if beside.is_file() {
-                environment.map = beside.to_string_lossy().into_owned();
+                *file = beside.to_string_lossy().into_owned();
             }
         }
         scene.check()?;
@@ -233,11 +260,29 @@ impl Scene {
         })
     }
 
+    /// Checks that a picture can be rendered: every field, the size in pixels, and that there is light.
+    pub(crate) fn check_picture(&self, illumination: Illumination, size: usize) -> Result<(), SceneError> {
+        self.check()?;
+        if !(1..=8192).contains(&size) {
+            return Err(SceneError::Size { size });
+        }
+        let missing = |light| Err(SceneError::NoLight { scene: self.name.clone(), light });
+        let (no_point, no_environment) = (self.point_lights.is_empty(), self.environment.is_none());
+        match illumination {
+            Illumination::Point if no_point => missing("point light"),
+            Illumination::Environment if no_environment => missing("environment"),
+            Illumination::All if no_point && no_environment => missing("light"),
+            _ => Ok(()),
+        }
+    }
+
     /// Everything that could be wrong with the fields, in their order.
     fn faults(&self) -> Vec<Fault> {
         let mut faults = self.camera.faults();
-        faults.push(Fault::new("sphere", "missing", !self.spheres.is_empty(), "at least one [[sphere]]"));
+        let has_subject = !(self.spheres.is_empty() && self.meshes.is_empty());
+        faults.push(Fault::new("sphere", "missing", has_subject, "at least one [[sphere]] or [[mesh]]"));
         faults.extend(self.spheres.iter().enumerate().flat_map(|(k, s)| s.faults(k)));
+        faults.extend(self.meshes.iter().enumerate().flat_map(|(k, m)| m.faults(k)));
         faults.extend(self.overlaps());
         faults.extend(self.plane.iter().flat_map(Plane::faults));
         faults.extend(self.point_lights.iter().enumerate().flat_map(|(k, l)| l.faults(k)));
@@ -327,7 +372,27 @@ impl Sphere {
     }
 }
 
+impl Mesh {
+    fn faults(&self, k: usize) -> Vec<Fault> {
+        let is_factor = self.scale > 0.0 && self.scale.is_finite();
+        let is_angle = self.rotation.is_finite();
+        let mut faults = vec![
+            Fault::point(format!("mesh[{k}].centre"), self.centre),
+            Fault::new(format!("mesh[{k}].scale"), self.scale, is_factor, "a factor above 0"),
+            Fault::new(format!("mesh[{k}].rotation"), self.rotation, is_angle, "degrees"),
+        ];
+        faults.extend(self.diffuse.map(|d| Fault::albedo(format!("mesh[{k}].diffuse"), d)));
+        faults
+    }
+}
+
 impl Plane {
+    /// Albedo of the check at a point.
+    pub(crate) fn albedo(&self, point: glam::DVec3) -> [f64; 3] {
+        let check = |x: f64| (x / self.check_size).floor() as i64;
+        if (check(point.x) + check(point.z)).rem_euclid(2) == 0 { self.light } else { self.dark }
+    }
+
     fn faults(&self) -> Vec<Fault> {
         vec![
             Fault::new("plane.height", self.height, self.height.is_finite(), "metres"),

@@ -1,0 +1,245 @@
+//! The reference renderer: a path tracer for any scene. Slow, noisy, and right.
+//!
+//! Every path of light is followed, with all interreflection. At each point, light from the environment is estimated in two
+//! ways, by directions drawn from the map and by the path's own direction, weighted by the balance heuristic (Veach
+//! 1997); point lights are evaluated directly. What a path's direction is drawn from is told in [`vertex`].
+//!
+//! What remains hard is light that a mesh (not a sphere) with a narrow lobe throws onto a diffuse surface, and that which
+//! a sphere throws there from small, bright spots of an environment: caustics without a technique of their own.
+
+mod glint;
+mod sampler;
+mod sky;
+mod vertex;
+mod world;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::DVec3;
+use lookmatch_imaging::Image;
+use lookmatch_materials::Material;
+use rayon::prelude::*;
+
+use crate::film::Film;
+use crate::scene::{Illumination, Scene};
+use crate::{EnvironmentMap, Part, Render, SceneError};
+use sampler::{Points, Sampler};
+use sky::Sky;
+use vertex::{Coat, Lobe, Targets, Vertex};
+use world::{Encounter, World};
+
+/// Most samples of a pixel: their table takes 16 bytes each.
+const MOST_SAMPLES: u32 = 1 << 20;
+/// Paths that go on from the first point that a pixel's sample sees.
+const SPLITS: u32 = 4;
+/// Reflections after which a path may end by chance.
+const CERTAIN: u32 = 4;
+/// Reflections after which it ends: so rare between albedos below 1 that nothing is missed.
+const LONGEST: u32 = 128;
+
+/// A scene prepared for one illumination, picture size and number of samples.
+///
+/// Each pixel is the mean over its area, estimated from its own random numbers: the same seed gives the same bits on any
+/// number of threads, and errors of pixels are independent.
+pub struct PathTracer {
+    world: World,
+    film: Film,
+    sky: Option<Sky>,
+    /// Position and intensity of the point lights.
+    lights: Vec<(DVec3, DVec3)>,
+    points: Points,
+    samples: u32,
+    seed: u64,
+}
+
+impl PathTracer {
+    /// Prepares a scene for pictures of `size` × `size` pixels (1 to 8192) with `samples` paths per pixel (1 to 1048576;
+    /// powers of two are the most accurate).
+    ///
+    /// Subjects keep their own diffuse colours; see [`Scene::for_model`] for materials that have none.
+    ///
+    /// # Errors
+    /// Where the scene lacks the light that is asked for, or one of its files cannot be read.
+    pub fn prepare(
+        scene: &Scene,
+        illumination: Illumination,
+        size: usize,
+        samples: u32,
+        seed: u64,
+    ) -> Result<Self, SceneError> {
+        scene.check_picture(illumination, size)?;
+        if !(1..=MOST_SAMPLES).contains(&samples) {
+            return Err(SceneError::Samples { samples });
+        }
+        let map = scene.environment.as_ref().filter(|_| illumination.has_environment());
+        let light = |l: &crate::PointLight| (l.position.into(), l.intensity.into());
+        let lights = scene.point_lights.iter().filter(|_| illumination.has_points()).map(light);
+        Ok(Self {
+            world: World::new(scene)?,
+            film: Film::new(&scene.camera, size),
+            sky: map.map(EnvironmentMap::load).transpose()?.map(Sky::new),
+            lights: lights.collect(),
+            points: Points::new(samples),
+            samples,
+            seed,
+        })
+    }
+
+    /// Estimates of chosen pixels (row by row from the top left), linear RGB, with all that is seen in them.
+    pub fn radiance(&self, material: &Material, part: Part, pixels: &[u32]) -> Vec<[f32; 3]> {
+        self.observed_radiance(material, part, pixels, &|_| ())
+    }
+
+    /// [`PathTracer::radiance`] that tells now and then how many pixels are done.
+    fn observed_radiance(
+        &self,
+        material: &Material,
+        part: Part,
+        pixels: &[u32],
+        observe: &(dyn Fn(usize) + Sync),
+    ) -> Vec<[f32; 3]> {
+        let bsdf = match part {
+            Part::Full => material.bsdf(),
+            Part::DiffuseOnly => material.diffuse_only().bsdf(),
+        };
+        let lobe = |sampling: lookmatch_materials::Sampling| {
+            let [u, v] = sampling.distribution.alpha;
+            Lobe { sampling, alpha: (u + v) / 2.0 }
+        };
+        let coat = Coat { bsdf: &*bsdf, diffuse: bsdf.diffuse().into(), lobe: bsdf.sampling().map(lobe) };
+        let done = AtomicUsize::new(0);
+        let pixel = |pixel: &u32| {
+            let value = self.pixel(&coat, *pixel).as_vec3().to_array();
+            observe(1 + done.fetch_add(1, Ordering::Relaxed));
+            value
+        };
+        pixels.par_iter().map(pixel).collect()
+    }
+
+    fn pixel(&self, coat: &Coat, pixel: u32) -> DVec3 {
+        let (x, y) = (pixel as usize % self.film.size, pixel as usize / self.film.size);
+        let sample = |index| {
+            let sampler = self.points.path(self.seed, pixel, index);
+            let [dx, dy] = sampler.set(0).first();
+            self.seen(coat, self.film.direction(x as f64 + dx, y as f64 + dy), &sampler)
+        };
+        (0..self.samples).map(sample).sum::<DVec3>() / f64::from(self.samples)
+    }
+
+    /// Radiance that the eye receives from a direction.
+    fn seen(&self, coat: &Coat, direction: DVec3, sampler: &Sampler) -> DVec3 {
+        match self.world.first(self.film.eye, direction, None) {
+            Some(at) => self.reflected(&self.vertex(coat, at, -direction), sampler, Walk::START),
+            None => self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.radiance(direction)),
+        }
+    }
+
+    fn vertex<'a>(&'a self, coat: &'a Coat, at: Encounter, to_viewer: DVec3) -> Vertex<'a> {
+        let targets = Targets { spheres: &self.world.spheres, lights: &self.lights };
+        Vertex::new(at, to_viewer, self.world.diffuse(&at, coat.diffuse), coat, targets)
+    }
+
+    /// Radiance that a point reflects to where it is seen from.
+    fn reflected(&self, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
+        let splits = if walk.depth == 0 { SPLITS } else { 1 };
+        let set = sampler.set(walk.depth * SPLITS + walk.branch);
+        let mut sum = self.from_lights(vertex) + self.from_sky(vertex, set.second(0), splits);
+        for k in 0..splits {
+            let [u, v] = set.second(1 + k);
+            // One number chooses between the parts of the mixture: dealt out evenly over the paths.
+            let u = (f64::from(k) + u) / f64::from(splits);
+            let Some(direction) = vertex.sample([u, v]) else { continue };
+            let Some(scattering) = vertex.scatter(direction) else { continue };
+            let density = scattering.density * f64::from(splits);
+            let Some(at) = self.world.first(vertex.at.position, direction, Some(vertex.at.surface)) else {
+                if let Some(sky) = &self.sky {
+                    sum += scattering.value * sky.radiance(direction) / (density + sky.density(direction));
+                }
+                continue;
+            };
+            let branch = if walk.depth == 0 { k } else { walk.branch };
+            let strength = walk.strength * scattering.value.max_element() / scattering.density;
+            let Some((walk, chance)) = (Walk { depth: walk.depth + 1, branch, strength }).survive(sampler)
+            else {
+                continue;
+            };
+            let next = self.vertex(vertex.coat(), at, -direction);
+            sum += scattering.value * self.reflected(&next, sampler, walk) / (density * chance);
+        }
+        sum
+    }
+
+    /// What a point reflects of the point lights.
+    fn from_lights(&self, vertex: &Vertex) -> DVec3 {
+        let from = |(position, intensity): &(DVec3, DVec3)| {
+            let to_light = *position - vertex.at.position;
+            let distance = to_light.length();
+            let direction = to_light / distance;
+            let value = vertex.value(direction);
+            if value == DVec3::ZERO || self.hides(vertex, direction, distance) {
+                return DVec3::ZERO;
+            }
+            value * *intensity / (distance * distance)
+        };
+        self.lights.iter().map(from).sum()
+    }
+
+    /// What a point reflects of the environment, by a direction drawn from its map.
+    fn from_sky(&self, vertex: &Vertex, numbers: [f64; 2], splits: u32) -> DVec3 {
+        let Some(sky) = &self.sky else { return DVec3::ZERO };
+        let (direction, density) = sky.sample(numbers);
+        match vertex.scatter(direction) {
+            Some(s) if !self.hides(vertex, direction, f64::INFINITY) => {
+                s.value * sky.radiance(direction) / (density + s.density * f64::from(splits))
+            }
+            _ => DVec3::ZERO,
+        }
+    }
+
+    fn hides(&self, vertex: &Vertex, direction: DVec3, distance: f64) -> bool {
+        self.world.hides(vertex.at.position, direction, vertex.at.surface, distance)
+    }
+}
+
+/// How far a path has gone.
+#[derive(Clone, Copy)]
+struct Walk {
+    /// Reflections so far.
+    depth: u32,
+    /// Which of the paths from the first point this is.
+    branch: u32,
+    /// About the share of the light that arrives at the eye.
+    strength: f64,
+}
+
+impl Walk {
+    const START: Self = Self { depth: 0, branch: 0, strength: 1.0 };
+
+    /// Ends weak paths by chance (Russian roulette); those that go on get the chance that they had.
+    fn survive(self, sampler: &Sampler) -> Option<(Self, f64)> {
+        if self.depth < CERTAIN {
+            return Some((self, 1.0));
+        }
+        let chance = self.strength.min(0.95);
+        let [u, _] = sampler.set(self.depth * SPLITS + self.branch).first();
+        let walk = Self { strength: self.strength / chance, ..self };
+        (u < chance && self.depth < LONGEST).then_some((walk, chance))
+    }
+}
+
+impl Render for PathTracer {
+    fn size(&self) -> usize {
+        self.film.size
+    }
+
+    fn render(&self, material: &Material, part: Part) -> Image {
+        self.render_observed(material, part, &|_| ())
+    }
+
+    fn render_observed(&self, material: &Material, part: Part, observe: &(dyn Fn(usize) + Sync)) -> Image {
+        let size = self.film.size;
+        let pixels: Vec<u32> = (0..(size * size) as u32).collect();
+        let values = self.observed_radiance(material, part, &pixels, observe);
+        Image::from_fn(size, size, |x, y| values[y * size + x])
+    }
+}
