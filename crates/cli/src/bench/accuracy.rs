@@ -3,7 +3,7 @@
 use indicatif::ProgressBar;
 use lookmatch_imaging::{delta_e76, lab_from_linear_srgb};
 use lookmatch_materials::Material;
-use lookmatch_rendering::{Illumination, Part, Renderer};
+use lookmatch_rendering::{Illumination, Part, PathTracer, Renderer};
 use serde::Serialize;
 
 use super::materials::{Named, surveyed};
@@ -176,21 +176,19 @@ impl Sums {
 }
 
 /// Two path tracers that differ in nothing but their random numbers.
-pub(crate) struct Truth<'a> {
-    stage: &'a Stage,
-    light: Illumination,
-}
+pub(crate) struct Truth([PathTracer; 2]);
 
-impl<'a> Truth<'a> {
+impl Truth {
     /// Prepares both for some number of paths per pixel.
-    pub(crate) fn prepare(stage: &'a Stage, light: Illumination, _samples: u32) -> anyhow::Result<Self> {
-        Ok(Self { stage, light })
+    pub(crate) fn prepare(stage: &Stage, light: Illumination, samples: u32) -> anyhow::Result<Self> {
+        let size = stage.renderer(light).size();
+        let prepare = |seed| PathTracer::prepare(&stage.scene, light, size, samples, seed);
+        Ok(Self([prepare(1)?, prepare(2)?]))
     }
 
     /// Two independent pictures of a material at some pixels.
     pub(crate) fn halves(&self, material: &Material, pixels: &[u32]) -> [Pixels; 2] {
-        let picture = ours(self.stage.renderer(self.light), material, pixels);
-        [picture.clone(), picture]
+        self.0.each_ref().map(|tracer| tracer.radiance(material, Part::Full, pixels))
     }
 }
 

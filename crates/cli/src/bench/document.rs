@@ -14,7 +14,7 @@ struct Section {
 
 /// The report for a terminal.
 pub(crate) fn plain(report: &Report) -> String {
-    let section = |s: Section| format!("{}\n{}{}\n", s.title, table(&s.rows), remark(&s.remark));
+    let section = |s: Section| format!("{}\n{}{}", s.title, table(&s.rows), remark(&s.remark));
     sections(report).into_iter().map(section).collect::<Vec<_>>().join("\n")
 }
 
@@ -142,24 +142,27 @@ fn peer_summary(peer: &PeerReport, report: &Report) -> Section {
         row("… of that noise alone", percent(ours.relative_noise)),
         row("our mean ΔE", delta_e(ours.mean_delta_e)),
         row("our CPU time, one of a batch", ms(report.timing.environment_image_cpu_ms)),
-        row(
-            "the peer's samples per pixel for our RMSE, extrapolated",
-            format!("{:.0}", peer.equal_error_samples),
-        ),
-        row("the peer's CPU time for our RMSE, extrapolated", format!("{:.0} s", peer.equal_error_cpu_s)),
-        row("**ratio at equal RMSE**, a picture of a batch", ratio(peer.equal_error_ratio)),
+        row("the peer's samples per pixel for our RMSE", format!("{:.0}", peer.equal_error_samples)),
+        row("the peer's CPU time for our RMSE", format!("{:.0} s", peer.equal_error_cpu_s)),
+        row("ratio at equal RMSE, a picture of a batch", ratio(peer.equal_error_ratio)),
         row("ratio at equal RMSE, a picture on its own", ratio(peer.equal_error_ratio_single)),
+        row(
+            "ratio at equal RMSE with the measured exponent, a picture of a batch",
+            ratio(peer.equal_error_ratio_measured_exponent),
+        ),
         row("ratio at equal mean ΔE, a picture of a batch", ratio(peer.equal_delta_e_ratio)),
         row(
             "bias: the peer's best pictures, brightness over converged",
             format!("{:+.3} %", 100.0 * bias.brightness),
         ),
         row("bias: root mean square ΔE, free of noise", delta_e(bias.rms_delta_e)),
+        row("… that could not be told from chance", delta_e(peer.bias_threshold)),
     ];
-    let remark =
-        "Extrapolated with the square root of the number of samples from the run with the most. The peer's \
-                  systematic difference from our path tracer (bias) is not held against it."
-            .to_owned();
+    let remark = "The peer's CPU time for a picture with our error, over our CPU time for it. Errors below those of the \
+                  table above are extrapolated with the square root of the number of samples (or with the measured \
+                  exponent, as if the gain of stratified samples lasted for ever). The peer's error is its noise alone: \
+                  what separates its converged pictures from our path tracer's (bias) is not held against it."
+        .to_owned();
     Section { title: "At equal error", rows: rows(["", "measured"], body), remark }
 }
 

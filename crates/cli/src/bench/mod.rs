@@ -59,7 +59,7 @@ impl Effort {
         batch: 8,
         runs: 2,
         peer_samples: [4, 9, 16],
-        peer_converged: 16,
+        peer_converged: 256,
     };
 }
 

@@ -1,9 +1,10 @@
 //! Another renderer beside ours, at equal error: Mitsuba 3, path tracing the same scene with the same material.
 //!
-//! A path tracer's error falls with the square root of its samples; few enough of them to be paid for leave more error
-//! than ours. So the peer is timed at several numbers of samples, and its time for our error is extrapolated with that
-//! law; how well the measured errors follow it is reported as their exponent. Of the peer's error only its noise is
-//! counted, as seen between two pictures; of ours all that separates it from converged pictures, their noise included.
+//! A path tracer's error falls with the square root of its samples, and as many as would reach our error take hours. So the
+//! peer is timed at several numbers of samples, and its time for our error is extrapolated with that law. Stratified
+//! samples do better while they are few; what the exponent measured between the last two runs would give, if it lasted
+//! for ever, is reported too, as the least that can be said. Of the peer's error only its noise is counted, as seen between
+//! two pictures; of ours all that separates it from converged pictures, their noise included.
 
 mod installation;
 mod worker;
@@ -19,7 +20,7 @@ use super::accuracy::{Difference, Truth, ours};
 use super::materials::{self, Named};
 use super::{Effort, Stage, Timing};
 use crate::output::spinner;
-use worker::{Picture, SAMPLER, Worker};
+use worker::{Cost, Picture, SAMPLER, Worker};
 
 /// Width of the metal's lobe.
 const ROUGHNESS: f64 = 0.1;
@@ -40,14 +41,17 @@ pub(crate) struct PeerReport {
     pub(crate) variants: Vec<Variant>,
     /// The fastest of them, which all other figures belong to.
     pub(crate) variant: &'static str,
-    pub(crate) runs: [Run; 3],
-    /// The power of the number of samples that the peer's error follows; in theory −1/2.
+    /// In ascending order of samples.
+    pub(crate) runs: Vec<Run>,
+    /// The power of the number of samples that the peer's error follows between its last two runs.
     pub(crate) exponent: f64,
     /// The peer's two best pictures against the converged ones.
     pub(crate) bias: Difference,
+    /// Root mean square ΔE*76 of a bias that noise alone could pretend.
+    pub(crate) bias_threshold: f64,
     /// Our picture against the converged ones.
     pub(crate) ours: Difference,
-    /// Samples per pixel that give the peer our relative error, extrapolated.
+    /// Samples per pixel that give the peer our relative error: extrapolated where no run has as little.
     pub(crate) equal_error_samples: f64,
     /// CPU seconds that they take.
     pub(crate) equal_error_cpu_s: f64,
@@ -55,6 +59,8 @@ pub(crate) struct PeerReport {
     pub(crate) equal_error_ratio: f64,
     /// The same, but for a picture on its own.
     pub(crate) equal_error_ratio_single: f64,
+    /// The ratio for a picture of a batch if the error went on with the measured exponent instead of −1/2.
+    pub(crate) equal_error_ratio_measured_exponent: f64,
     /// The ratio for a picture of a batch where equal mean ΔE*76 is asked for, instead of equal relative error.
     pub(crate) equal_delta_e_ratio: f64,
     /// Pictures that the peer rendered, warming up included.
@@ -113,8 +119,9 @@ impl PeerReport {
         progress.set_message("Mitsuba: rendering");
         studio.start(installation, best, effort, &material)?;
         let [few, some, many] = effort.peer_samples;
-        let runs = [studio.run(few)?, studio.run(some)?, studio.run(many)?];
+        let mut runs = vec![studio.run(few)?, studio.run(some)?, studio.run(many)?];
         let converged = studio.pair(effort.peer_converged)?;
+        runs.push(studio.measured(&converged));
         progress.set_message("tracing paths");
         let [bias, ours] = differences(stage, effort, &material, &converged)?;
         progress.finish_and_clear();
@@ -128,7 +135,10 @@ impl PeerReport {
             material,
             variants,
             variant: best,
-            exponent: exponent(&runs),
+            exponent: equal.exponent,
+            // Products of independent errors have a mean of 0; that of so many pixels is off by their root.
+            bias_threshold: runs.last().map_or(f64::NAN, |r| r.mean_delta_e)
+                / (effort.pixels as f64).powf(0.25),
             runs,
             bias,
             ours,
@@ -136,6 +146,7 @@ impl PeerReport {
             equal_error_cpu_s: equal.cpu_s,
             equal_error_ratio: equal.ratio,
             equal_error_ratio_single: equal.ratio_single,
+            equal_error_ratio_measured_exponent: equal.ratio_measured_exponent,
             equal_delta_e_ratio: equal.delta_e_ratio,
             images: studio.images,
         })
@@ -189,16 +200,15 @@ impl Studio<'_> {
     /// Time and noise at some number of samples. A first picture, which may have to be compiled, does not count.
     fn run(&mut self, samples: u32) -> anyhow::Result<Run> {
         self.render(samples, 0)?;
-        let [a, b] = self.pair(samples)?;
-        let fastest = if a.cost.cpu_s < b.cost.cpu_s { a.cost } else { b.cost };
+        let pair = self.pair(samples)?;
+        Ok(self.measured(&pair))
+    }
+
+    /// The lesser time and the noise of two pictures.
+    fn measured(&self, [a, b]: &[Picture; 2]) -> Run {
+        let Cost { samples, cpu_s, wall_s } = if a.cost.cpu_s < b.cost.cpu_s { a.cost } else { b.cost };
         let (relative_rmse, mean_delta_e) = noise(&a.image, &b.image, self.stage.environment.subjects());
-        Ok(Run {
-            samples: fastest.samples,
-            cpu_s: fastest.cpu_s,
-            wall_s: fastest.wall_s,
-            relative_rmse,
-            mean_delta_e,
-        })
+        Run { samples, cpu_s, wall_s, relative_rmse, mean_delta_e }
     }
 }
 
@@ -230,35 +240,64 @@ fn differences(
     Ok([Difference::between([&peer[0], &peer[1]], &truth), Difference::between([&ours, &ours], &truth)])
 }
 
-/// The slope of the error over the number of samples, both in their logarithm.
-fn exponent([first, .., last]: &[Run; 3]) -> f64 {
-    (last.relative_rmse / first.relative_rmse).ln()
-        / (f64::from(last.samples) / f64::from(first.samples)).ln()
-}
-
 /// What the peer needs for our error.
 struct Equal {
+    exponent: f64,
     samples: f64,
     cpu_s: f64,
     ratio: f64,
     ratio_single: f64,
+    ratio_measured_exponent: f64,
     delta_e_ratio: f64,
 }
 
 impl Equal {
-    /// Of the runs, the one with the most samples counts: it has the least overhead, and the least is extrapolated.
-    fn new([.., best]: &[Run; 3], ours: &Difference, timing: &Timing) -> Self {
-        let factor = (best.relative_rmse / ours.relative_rmse).powi(2);
-        let over = |milliseconds: f64| 1e3 * factor * best.cpu_s / milliseconds;
-        let delta_e_factor = (best.mean_delta_e / ours.mean_delta_e).powi(2);
+    fn new(runs: &[Run], ours: &Difference, timing: &Timing) -> Self {
+        let rmse = Law::new(runs, |run| run.relative_rmse);
+        let delta_e = Law::new(runs, |run| run.mean_delta_e);
+        // The run with the most samples has the least overhead.
+        let cpu_s_per_sample = runs.last().map_or(f64::NAN, |run| run.cpu_s / f64::from(run.samples));
+        let in_batch = timing.environment_image_cpu_ms;
+        let over = |samples: f64, milliseconds: f64| 1e3 * samples * cpu_s_per_sample / milliseconds;
+        let samples = rmse.samples(ours.relative_rmse, -0.5);
         Self {
-            samples: factor * f64::from(best.samples),
-            cpu_s: factor * best.cpu_s,
-            ratio: over(timing.environment_image_cpu_ms),
-            ratio_single: over(timing.environment_single_cpu_ms),
-            delta_e_ratio: 1e3 * delta_e_factor * best.cpu_s / timing.environment_image_cpu_ms,
+            exponent: rmse.exponent(),
+            samples,
+            cpu_s: samples * cpu_s_per_sample,
+            ratio: over(samples, in_batch),
+            ratio_single: over(samples, timing.environment_single_cpu_ms),
+            ratio_measured_exponent: over(rmse.samples(ours.relative_rmse, rmse.exponent()), in_batch),
+            delta_e_ratio: over(delta_e.samples(ours.mean_delta_e, -0.5), in_batch),
         }
     }
+}
+
+/// Error over the number of samples, a line between any two runs where both are logarithms.
+struct Law(Vec<[f64; 2]>);
+
+impl Law {
+    fn new(runs: &[Run], error: impl Fn(&Run) -> f64) -> Self {
+        Self(runs.iter().map(|run| [f64::from(run.samples).ln(), error(run).ln()]).collect())
+    }
+
+    /// The slope between the last two runs.
+    fn exponent(&self) -> f64 {
+        self.0.windows(2).last().map_or(f64::NAN, slope)
+    }
+
+    /// Samples for an error: between the runs by the line, beyond the last one by a power of their number.
+    fn samples(&self, error: f64, exponent: f64) -> f64 {
+        let within = self.0.windows(2).find(|pair| pair[1][1] <= error.ln());
+        let beyond = || self.0.last().map(|last| (*last, exponent));
+        let Some(([samples, known], exponent)) = within.map(|p| (p[1], slope(p))).or_else(beyond) else {
+            return f64::NAN;
+        };
+        (samples + (error.ln() - known) / exponent).exp()
+    }
+}
+
+fn slope(pair: &[[f64; 2]]) -> f64 {
+    (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0])
 }
 
 #[cfg(test)]
@@ -274,17 +313,26 @@ mod tests {
             relative_rmse,
             mean_delta_e: 10.0 * relative_rmse,
         };
-        let runs = [run(16, 0.4), run(64, 0.2), run(256, 0.1)];
-        assert!((exponent(&runs) + 0.5).abs() < 1e-12);
         let difference = Difference { relative_rmse: 0.01, mean_delta_e: 0.2, ..Difference::default() };
         let timing =
             Timing { environment_image_cpu_ms: 2.0, environment_single_cpu_ms: 4.0, ..Timing::default() };
-        let equal = Equal::new(&runs, &difference, &timing);
+        let equal = Equal::new(&[run(64, 0.2), run(256, 0.1)], &difference, &timing);
+        assert!((equal.exponent + 0.5).abs() < 1e-12);
         assert!((equal.samples / 25_600.0 - 1.0).abs() < 1e-9);
         assert!((equal.cpu_s / 2_560.0 - 1.0).abs() < 1e-9);
         assert!(
             (equal.ratio / 1.28e6 - 1.0).abs() < 1e-9 && (equal.ratio_single / 0.64e6 - 1.0).abs() < 1e-9
         );
+        assert!((equal.ratio_measured_exponent / equal.ratio - 1.0).abs() < 1e-9);
         assert!((equal.delta_e_ratio / 3.2e5 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn errors_that_were_measured_are_not_extrapolated() {
+        let law = Law([[16.0, 0.8], [64.0, 0.2], [256.0, 0.1]].map(|run: [f64; 2]| run.map(f64::ln)).into());
+        assert!((law.exponent() + 0.5).abs() < 1e-12);
+        for (error, samples) in [(0.4, 32.0), (0.1, 256.0), (0.01, 25_600.0), (1.6, 8.0)] {
+            assert!((law.samples(error, -0.5) / samples - 1.0).abs() < 1e-9, "{error}");
+        }
     }
 }
