@@ -357,10 +357,18 @@ fn the_benchmark_compares_with_mitsuba() {
     let report = json(folder.path(), &command);
     has_figures(&report, &FIGURES);
     has_figures(&report, &["equal_error_ratio"]);
-    has_figures(&report["peer"], &["equal_error_cpu_s", "equal_error_ratio_single", "images"]);
-    // Two path tracers that share nothing but the scene.
-    let brightness = report["peer"]["bias"]["brightness"].as_f64().unwrap();
-    assert!(brightness.abs() < 0.03, "Mitsuba's pictures are {brightness} brighter than ours");
+    let comparisons = report["peer"]["comparisons"].as_array().unwrap();
+    assert_eq!(comparisons.len(), 2);
+    for comparison in comparisons {
+        has_figures(comparison, &["equal_error_cpu_s", "equal_error_ratio_single", "image_cpu_ms"]);
+        // Two path tracers that share nothing but the scene.
+        let brightness = comparison["bias"]["brightness"].as_f64().unwrap();
+        assert!(
+            brightness.abs() < 0.03,
+            "{}: Mitsuba's pictures are {brightness} brighter",
+            comparison["name"]
+        );
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::Report;
 use super::accuracy::MaterialError;
-use super::peer::PeerReport;
+use super::peer::{Comparison, PeerReport, Variant};
 use crate::output::table;
 
 /// A table with its heading, and a remark below it.
@@ -41,7 +41,7 @@ pub(crate) fn markdown(report: &Report) -> String {
 
 fn sections(report: &Report) -> Vec<Section> {
     let mut sections = vec![summary(report)];
-    sections.extend(report.peer.iter().flat_map(|peer| [peer_runs(peer), peer_summary(peer, report)]));
+    sections.extend(report.peer.iter().flat_map(|peer| [peer_runs(peer), peer_summary(peer)]));
     sections.push(errors(report));
     sections.push(conditions(report));
     sections
@@ -57,8 +57,6 @@ fn summary(report: &Report) -> Section {
     let body = [
         row("picture pair (point light, environment), one of a batch", ms(t.image_pair_cpu_ms)),
         row("picture pair on its own", ms(t.single_pair_cpu_ms)),
-        row("metal under the environment, one of a batch", ms(t.environment_image_cpu_ms)),
-        row("metal under the environment on its own", ms(t.environment_single_cpu_ms)),
         row("metric: four pairs of pictures, CIELAB of both sides", ms(t.metric_ms)),
         row("metric: the same with the CIELAB of one side kept", ms(t.metric_cached_ms)),
         row(
@@ -103,67 +101,68 @@ fn errors(report: &Report) -> Section {
 }
 
 fn peer_runs(peer: &PeerReport) -> Section {
-    let body = peer.runs.iter().map(|run| {
-        [
-            run.samples.to_string(),
-            format!("{:.2}", run.cpu_s),
-            format!("{:.2}", run.wall_s),
-            percent(run.relative_rmse),
-            delta_e(run.mean_delta_e),
-        ]
-    });
-    let variants: Vec<String> = peer
-        .variants
-        .iter()
-        .map(|v| format!("{} {:.2} CPU s at {} samples", v.name, v.cpu_s, v.samples))
-        .collect();
+    let body =
+        peer.comparisons.iter().flat_map(|c| c.runs.iter().map(move |run| (c, run))).map(|(c, run)| {
+            [
+                c.name.clone(),
+                run.samples.to_string(),
+                format!("{:.2}", run.cpu_s),
+                format!("{:.2}", run.wall_s),
+                percent(run.relative_rmse),
+                delta_e(run.mean_delta_e),
+            ]
+        });
+    let variant = |v: &Variant| format!("{} {:.2} CPU s at {} samples", v.name, v.cpu_s, v.samples);
+    let variants: Vec<String> = peer.variants.iter().map(variant).collect();
     let remark = format!(
-        "{} {}, variant {} (tried: {}), sampler {}, path integrator with all bounces, box filter, one picture under the \
-         environment of {}. Compilation and first pictures are left out. The error is noise alone, as seen between two \
-         pictures; it falls with the number of samples to the power of {:.2}. {} pictures were rendered.",
+        "{} {}, variant {} (tried: {}), sampler {}, path integrator with all bounces, box filter, pictures under the \
+         environment. CPU time is that of all threads for the faster of two pictures; compilation falls to the other. The \
+         error is noise alone, as seen between the two. {} pictures were rendered.",
         peer.name,
         peer.version,
         peer.variant,
         variants.join(", "),
         peer.sampler,
-        peer.material_name,
-        peer.exponent,
         peer.images
     );
-    let header = ["samples per pixel", "CPU s", "wall s", "relative RMSE", "mean ΔE"];
+    let header = ["material", "samples per pixel", "CPU s", "wall s", "relative RMSE", "mean ΔE"];
     Section { title: "The peer", rows: rows(header, body), remark }
 }
 
-fn peer_summary(peer: &PeerReport, report: &Report) -> Section {
-    let row = |what: &str, value: String| [what.to_owned(), value];
-    let (ours, bias) = (&peer.ours, &peer.bias);
-    let body = [
-        row("our relative RMSE, the converged picture's noise included", percent(ours.relative_rmse)),
-        row("… of that noise alone", percent(ours.relative_noise)),
-        row("our mean ΔE", delta_e(ours.mean_delta_e)),
-        row("our CPU time, one of a batch", ms(report.timing.environment_image_cpu_ms)),
-        row("the peer's samples per pixel for our RMSE", format!("{:.0}", peer.equal_error_samples)),
-        row("the peer's CPU time for our RMSE", format!("{:.0} s", peer.equal_error_cpu_s)),
-        row("ratio at equal RMSE, a picture of a batch", ratio(peer.equal_error_ratio)),
-        row("ratio at equal RMSE, a picture on its own", ratio(peer.equal_error_ratio_single)),
-        row(
-            "ratio at equal RMSE with the measured exponent, a picture of a batch",
-            ratio(peer.equal_error_ratio_measured_exponent),
-        ),
-        row("ratio at equal mean ΔE, a picture of a batch", ratio(peer.equal_delta_e_ratio)),
-        row(
-            "bias: the peer's best pictures, brightness over converged",
-            format!("{:+.3} %", 100.0 * bias.brightness),
-        ),
-        row("bias: root mean square ΔE, free of noise", delta_e(bias.rms_delta_e)),
-        row("… that could not be told from chance", delta_e(peer.bias_threshold)),
-    ];
-    let remark = "The peer's CPU time for a picture with our error, over our CPU time for it. Errors below those of the \
-                  table above are extrapolated with the square root of the number of samples (or with the measured \
-                  exponent, as if the gain of stratified samples lasted for ever). The peer's error is its noise alone: \
-                  what separates its converged pictures from our path tracer's (bias) is not held against it."
+/// A line of the table at equal error: what it says, and how to find it.
+type Line = (&'static str, fn(&Comparison) -> String);
+
+const AT_EQUAL_ERROR: [Line; 14] = [
+    ("our relative RMSE, the converged picture's noise included", |c| percent(c.ours.relative_rmse)),
+    ("… of that noise alone", |c| percent(c.ours.relative_noise)),
+    ("our mean ΔE", |c| delta_e(c.ours.mean_delta_e)),
+    ("our CPU time, one of a batch", |c| ms(c.cost.image_cpu_ms)),
+    ("our CPU time, on its own", |c| ms(c.cost.single_image_cpu_ms)),
+    ("the peer's error falls with its samples to the power of", |c| format!("{:.2}", c.equal.exponent)),
+    ("the peer's samples per pixel for our RMSE", |c| format!("{:.0}", c.equal.equal_error_samples)),
+    ("the peer's CPU time for our RMSE", |c| format!("{:.0} s", c.equal.equal_error_cpu_s)),
+    ("ratio at equal RMSE, one of a batch", |c| ratio(c.equal.equal_error_ratio)),
+    ("ratio at equal RMSE, on its own", |c| ratio(c.equal.equal_error_ratio_single)),
+    ("ratio at equal RMSE with the measured power", |c| ratio(c.equal.equal_error_ratio_measured_exponent)),
+    ("ratio at equal mean ΔE, one of a batch", |c| ratio(c.equal.equal_delta_e_ratio)),
+    ("bias in brightness", |c| format!("{:+.3} %", 100.0 * c.bias.brightness)),
+    ("bias, root mean square ΔE (that of chance)", |c| {
+        format!("{} ({})", delta_e(c.bias.rms_delta_e), delta_e(c.bias_threshold))
+    }),
+];
+
+fn peer_summary(peer: &PeerReport) -> Section {
+    let cells = |name: &str, value: fn(&Comparison) -> String| -> Vec<String> {
+        std::iter::once(name.to_owned()).chain(peer.comparisons.iter().map(value)).collect()
+    };
+    let header = cells("", |c| c.name.clone());
+    let body = AT_EQUAL_ERROR.iter().map(|(name, value)| cells(name, *value));
+    let remark = "The ratio is the peer's CPU time for a picture with our error over our CPU time for it. Errors below those \
+                  of the table above are extrapolated with the square root of the number of samples (or with the \
+                  measured power, as if the gain of stratified samples lasted for ever). The peer's error is its noise \
+                  alone: what separates its converged pictures from our path tracer's (bias) is not held against it."
         .to_owned();
-    Section { title: "At equal error", rows: rows(["", "measured"], body), remark }
+    Section { title: "At equal error", rows: std::iter::once(header).chain(body).collect(), remark }
 }
 
 fn conditions(report: &Report) -> Section {

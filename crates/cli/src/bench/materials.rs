@@ -76,9 +76,20 @@ pub(crate) fn batch(count: usize, run: usize) -> Result<Vec<Material>, MaterialE
     (0..count).map(|k| Material::parse(&text(k))).collect()
 }
 
-/// A metal for comparisons: GGX with the complex index of gold.
-pub(crate) fn gold(roughness: f64) -> Result<Named, MaterialError> {
-    Named::new("ggx-conductor", "gold", GOLD, roughness)
+/// A metal and a plastic that other renderers have too, for comparisons with them.
+pub(crate) fn shared() -> Result<[Named; 2], MaterialError> {
+    let plastic = Named::new("ggx", "index 1.5, albedo 0.5", "diffuse=0.5,ior=1.5", 0.1)?;
+    Ok([Named::new("ggx-conductor", "gold", GOLD, 0.1)?, plastic])
+}
+
+/// A batch of `count` materials that differ in the width of their lobes.
+pub(crate) fn of_all_widths(material: &Material, count: usize) -> Result<Vec<Material>, MaterialError> {
+    let of_width = |k: usize| {
+        let mut material = material.clone();
+        material.set_number("roughness", 0.02 + 0.5 * k as f64 / count as f64)?;
+        Ok(material)
+    };
+    (0..count).map(of_width).collect()
 }
 
 #[cfg(test)]

@@ -72,7 +72,8 @@ pub(crate) struct Report {
     pub(crate) preparation: Preparation,
     #[serde(flatten)]
     pub(crate) accuracy: Accuracy,
-    /// CPU time that the peer needs for a picture with our error, over ours in a batch.
+    /// CPU time that the peer needs for a picture with our error, over ours in a batch: of the materials that were compared,
+    /// the one with the least.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) equal_error_ratio: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -90,12 +91,12 @@ impl Report {
         let (stage, preparation) = Stage::prepare(&scene, effort.size)?;
         let timing = Timing::measure(&stage, &effort)?;
         let accuracy = Accuracy::measure(&stage, &effort)?;
-        let peer = peer.map(|p| PeerReport::measure(p, &stage, &effort, &timing)).transpose()?;
+        let peer = peer.map(|p| PeerReport::measure(p, &stage, &effort)).transpose()?;
         Ok(Self {
             timing,
             preparation,
             accuracy,
-            equal_error_ratio: peer.as_ref().map(|p| p.equal_error_ratio),
+            equal_error_ratio: peer.as_ref().map(PeerReport::equal_error_ratio),
             peer,
             effort,
             machine: Machine::this(),

@@ -9,7 +9,7 @@ use lookmatch_materials::{Bsdf, Material};
 use lookmatch_rendering::{Part, Renderer};
 use serde::Serialize;
 
-use super::materials::{batch, gold};
+use super::materials::{batch, of_all_widths};
 use super::{Effort, Stage};
 use crate::output::spinner;
 
@@ -20,48 +20,58 @@ pub(crate) struct Timing {
     pub(crate) image_pair_cpu_ms: f64,
     /// The same for a material on its own.
     pub(crate) single_pair_cpu_ms: f64,
-    /// A picture of a metal under the environment, as one of a batch.
-    pub(crate) environment_image_cpu_ms: f64,
-    /// The same for a metal on its own.
-    pub(crate) environment_single_cpu_ms: f64,
     /// Equation 3 over four pairs of pictures, CIELAB of both sides included.
     pub(crate) metric_ms: f64,
     /// The same with the CIELAB of one side given.
     pub(crate) metric_cached_ms: f64,
 }
 
+/// CPU milliseconds of one picture, one thread, the fastest of several runs.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct PictureCost {
+    /// As one of a batch.
+    pub(crate) image_cpu_ms: f64,
+    /// On its own.
+    pub(crate) single_image_cpu_ms: f64,
+}
+
 impl Timing {
-    /// Times everything on one thread.
+    /// Times pictures and comparisons.
     pub(crate) fn measure(stage: &Stage, effort: &Effort) -> anyhow::Result<Self> {
         let progress = spinner("timing pictures and comparisons");
-        // A pool of one: its thread's clock then counts all the work, and nothing but the work.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().context("cannot start a thread")?;
-        let timing = pool.install(|| Self::on_this_thread(stage, effort));
+        let batches = (0..effort.runs).map(|run| batch(effort.batch, run)).collect::<Result<Vec<_>, _>>()?;
+        let pair = on_one_thread(|| cost(&[&stage.point, &stage.environment], &batches))?;
+        let (source, target) = (views(stage, &batches[0][0]), views(stage, &batches[0][1]));
+        let [metric_ms, metric_cached_ms] = on_one_thread(|| metric(&source, &target, effort.runs))?;
         progress.finish_and_clear();
-        timing
+        let PictureCost { image_cpu_ms: image_pair_cpu_ms, single_image_cpu_ms: single_pair_cpu_ms } = pair;
+        Ok(Self { image_pair_cpu_ms, single_pair_cpu_ms, metric_ms, metric_cached_ms })
     }
+}
 
-    fn on_this_thread(stage: &Stage, effort: &Effort) -> anyhow::Result<Self> {
-        let pairs = (0..effort.runs).map(|run| batch(effort.batch, run)).collect::<Result<Vec<_>, _>>()?;
-        let metal = |k: usize| gold(0.02 + 0.5 * k as f64 / effort.batch as f64).map(|named| named.material);
-        let metals = (0..effort.batch).map(metal).collect::<Result<Vec<_>, _>>()?;
-        let both = |materials: &[Material]| {
-            black_box((pictures(&stage.point, materials), pictures(&stage.environment, materials)));
-        };
-        let under_environment = |materials: &[Material]| {
-            black_box(pictures(&stage.environment, materials));
-        };
-        let runs = effort.runs;
-        let each = 1.0 / effort.batch as f64;
-        let [metric_ms, metric_cached_ms] = metric(stage, effort)?;
-        Ok(Self {
-            image_pair_cpu_ms: each * fastest(runs, |run| both(&pairs[run])),
-            single_pair_cpu_ms: each * fastest(runs, |run| pairs[run].chunks(1).for_each(both)),
-            environment_image_cpu_ms: each * fastest(runs, |_| under_environment(&metals)),
-            environment_single_cpu_ms: each * fastest(runs, |_| metals.chunks(1).for_each(under_environment)),
-            metric_ms,
-            metric_cached_ms,
-        })
+impl PictureCost {
+    /// Times pictures under the environment of materials like a given one.
+    pub(crate) fn measure(stage: &Stage, effort: &Effort, material: &Material) -> anyhow::Result<Self> {
+        let batch = of_all_widths(material, effort.batch)?;
+        on_one_thread(|| cost(&[&stage.environment], &vec![batch; effort.runs]))
+    }
+}
+
+/// Works in a pool of one thread: its clock then counts all the work, and nothing but the work.
+fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().context("cannot start a thread")?;
+    Ok(pool.install(work))
+}
+
+/// The cost per material of pictures by all of some renderers; each run has a batch.
+fn cost(renderers: &[&Renderer], batches: &[Vec<Material>]) -> PictureCost {
+    let render = |materials: &[Material]| {
+        renderers.iter().for_each(|renderer| drop(black_box(pictures(renderer, materials))));
+    };
+    let each = |milliseconds: f64| milliseconds / batches[0].len() as f64;
+    PictureCost {
+        image_cpu_ms: each(fastest(batches.len(), |run| render(&batches[run]))),
+        single_image_cpu_ms: each(fastest(batches.len(), |run| batches[run].chunks(1).for_each(render))),
     }
 }
 
@@ -122,23 +132,21 @@ fn to_lab(views: &Views, planes: &mut [Vec<f32>; 4]) {
 }
 
 /// Milliseconds of equation 3 with the CIELAB of both sides, and of one.
-fn metric(stage: &Stage, effort: &Effort) -> anyhow::Result<[f64; 2]> {
-    let materials = batch(4, 0)?;
-    let (source, target) = (views(stage, &materials[0]), views(stage, &materials[1]));
+fn metric(source: &Views, target: &Views, runs: usize) -> [f64; 2] {
     let empty = || source.each_ref().map(|view| vec![0.0; 3 * view.len()]);
     let (mut a, mut b) = (empty(), empty());
     // Runs of a millisecond are cheap, and the more there are, the less other load matters.
-    let runs = 10 * effort.runs;
+    let runs = 10 * runs;
     let whole = fastest(runs, |_| {
-        to_lab(black_box(&source), &mut a);
-        to_lab(black_box(&target), &mut b);
+        to_lab(black_box(source), &mut a);
+        to_lab(black_box(target), &mut b);
         black_box(equation_3(&a, &b));
     });
     let cached = fastest(runs, |_| {
-        to_lab(black_box(&target), &mut b);
+        to_lab(black_box(target), &mut b);
         black_box(equation_3(black_box(&a), &b));
     });
-    Ok([whole, cached])
+    [whole, cached]
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ const PACKAGES: [&str; 2] = ["mitsuba==3.9.1", "drjit==1.5.0"];
 /// The oldest LLVM that can compile the peer's kernels; older ones end the process.
 const OLDEST_LLVM: u32 = 17;
 /// How to get one.
-pub(super) const LLVM_HINT: &str = "apt-get install libllvm19, or set DRJIT_LIBLLVM_PATH to a libLLVM";
+pub(super) const LLVM_HINT: &str = "on Debian: apt-get install libllvm19; elsewhere set DRJIT_LIBLLVM_PATH to a libLLVM of version 17 or newer";
 
 /// An installed peer.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ impl Installation {
         let llvm = find_llvm();
         if llvm.is_none() {
             eprintln!(
-                "note: no LLVM {OLDEST_LLVM} or newer was found, so Mitsuba is several times slower; {LLVM_HINT}"
+                "note: there is no LLVM for Mitsuba, which is several times slower without ({LLVM_HINT})"
             );
         }
         Ok(Self { python, llvm })
@@ -82,7 +82,11 @@ fn make(home: &Path, python: &Path) -> anyhow::Result<()> {
         .args(["-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--retries", "1"])
         .args(PACKAGES)
         .output();
-    succeed(pip, "install Mitsuba with pip", "the Python package index must be reachable, this once")
+    succeed(
+        pip,
+        "install Mitsuba with pip",
+        "the Python package index must be reachable this once, and have Mitsuba for this Python",
+    )
 }
 
 /// Turns a command that failed into an error with its last line and a hint.
@@ -93,7 +97,8 @@ fn succeed(output: std::io::Result<Output>, what: &str, hint: &str) -> anyhow::R
     }
     let said = [output.stderr, output.stdout].concat();
     let said = String::from_utf8_lossy(&said).into_owned();
-    let telling = said.lines().find(|l| l.contains("ERROR") || l.contains("Error"));
+    let telling =
+        said.lines().rev().find_map(|line| line.strip_prefix("ERROR: ").or(line.strip_prefix("Error: ")));
     let reason = telling.or(said.lines().last()).unwrap_or("no reason given").trim();
     Err(anyhow!("cannot {what}: {reason} ({hint})"))
 }
@@ -145,13 +150,12 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_installation_is_not_taken_for_a_complete_one() {
+    fn an_interpreter_that_does_not_run_is_none() {
         let folder = tempfile::tempdir().unwrap();
-        let python = folder.path().join("venv/bin/python");
-        fs::create_dir_all(python.parent().unwrap()).unwrap();
+        let python = folder.path().join("python");
+        assert!(!answers(&python));
         fs::write(&python, "").unwrap();
-        fs::write(folder.path().join("installed"), PACKAGES.join("\n")).unwrap();
-        assert!(!answers(&python), "an interpreter that does not run is none");
+        assert!(!answers(&python));
     }
 
     #[test]
@@ -159,6 +163,6 @@ mod tests {
         let output =
             Command::new("sh").args(["-c", "echo fine; echo 'ERROR: no route' >&2; exit 1"]).output();
         let message = succeed(output, "install it", "plug it in").unwrap_err().to_string();
-        assert_eq!(message, "cannot install it: ERROR: no route (plug it in)");
+        assert_eq!(message, "cannot install it: no route (plug it in)");
     }
 }

@@ -72,14 +72,30 @@ def light(request):
     return {"type": "point", "position": point["position"], "intensity": rgb(point["intensity"])}
 
 
-def metal(material):
-    """GGX with separable Smith masking and the exact Fresnel reflectance: the same function on both sides."""
+def lobe(material, scale):
+    """GGX with separable Smith masking and exact Fresnel reflectance: a dielectric is a conductor with k = 0."""
+    index = material.get("eta", [material.get("ior", 1)] * 3)
     return {
         "type": "roughconductor",
         "distribution": "ggx",
         "alpha": material["roughness_u"],
-        "eta": rgb(material["eta"]),
-        "k": rgb(material["k"]),
+        "eta": rgb(index),
+        "k": rgb(material.get("k", [0] * 3)),
+        "specular_reflectance": scale,
+    }
+
+
+def surface(material):
+    """The same function as lookmatch's. Its diffuse term is not coupled to the interface, as roughplastic's is, so a plastic
+    is a sum: a blend of both terms, each divided by its share. The share gives about the least noise."""
+    if "diffuse" not in material:
+        return lobe(material, 1.0)
+    share = 0.2
+    return {
+        "type": "blendbsdf",
+        "weight": share,
+        "first": {"type": "diffuse", "reflectance": rgb([d / (1 - share) for d in material["diffuse"]])},
+        "second": lobe(material, 1 / share),
     }
 
 
@@ -96,7 +112,7 @@ def load(request):
                 "type": "sphere",
                 "center": sphere["centre"],
                 "radius": sphere["radius"],
-                "bsdf": metal(request["material"]),
+                "bsdf": surface(request["material"]),
             },
             "plane": checkerboard(scene["plane"]),
             "light": light(request),

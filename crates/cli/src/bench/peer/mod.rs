@@ -9,25 +9,26 @@
 mod installation;
 mod worker;
 
+use indicatif::ProgressBar;
 use lookmatch_imaging::{Image, delta_e76, lab_from_linear_srgb};
 use lookmatch_materials::Material;
 use lookmatch_rendering::Illumination;
 use serde::Serialize;
 
 pub(crate) use installation::Installation;
+use installation::LLVM_HINT;
 
 use super::accuracy::{Difference, Truth, ours};
-use super::materials::{self, Named};
-use super::{Effort, Stage, Timing};
+use super::materials::{Named, shared};
+use super::timing::PictureCost;
+use super::{Effort, Stage};
 use crate::output::spinner;
 use worker::{Cost, Picture, SAMPLER, Worker};
 
-/// Width of the metal's lobe.
-const ROUGHNESS: f64 = 0.1;
 /// Our error is a single material's here, so that many more paths per pixel can be paid for.
 const MORE_PATHS: u32 = 8;
 
-/// The peer's speed and error beside ours, for a gold-like metal under the environment.
+/// The peer's speed and error beside ours, for pictures under the environment.
 #[derive(Debug, Serialize)]
 pub(crate) struct PeerReport {
     pub(crate) name: &'static str,
@@ -35,36 +36,32 @@ pub(crate) struct PeerReport {
     pub(crate) sampler: &'static str,
     /// The LLVM library that the peer compiles with.
     pub(crate) llvm: Option<String>,
-    pub(crate) material_name: String,
-    pub(crate) material: Material,
     /// The variants that were tried, all with the same number of samples.
     pub(crate) variants: Vec<Variant>,
     /// The fastest of them, which all other figures belong to.
     pub(crate) variant: &'static str,
-    /// In ascending order of samples.
+    pub(crate) comparisons: Vec<Comparison>,
+    /// Pictures that the peer rendered.
+    pub(crate) images: usize,
+}
+
+/// Both renderers' pictures of one material.
+#[derive(Debug, Serialize)]
+pub(crate) struct Comparison {
+    pub(crate) name: String,
+    pub(crate) material: Material,
+    /// The peer's pictures, in ascending order of samples.
     pub(crate) runs: Vec<Run>,
-    /// The power of the number of samples that the peer's error follows between its last two runs.
-    pub(crate) exponent: f64,
     /// The peer's two best pictures against the converged ones.
     pub(crate) bias: Difference,
     /// Root mean square ΔE*76 of a bias that noise alone could pretend.
     pub(crate) bias_threshold: f64,
     /// Our picture against the converged ones.
     pub(crate) ours: Difference,
-    /// Samples per pixel that give the peer our relative error: extrapolated where no run has as little.
-    pub(crate) equal_error_samples: f64,
-    /// CPU seconds that they take.
-    pub(crate) equal_error_cpu_s: f64,
-    /// That over our CPU time for a picture, as one of a batch.
-    pub(crate) equal_error_ratio: f64,
-    /// The same, but for a picture on its own.
-    pub(crate) equal_error_ratio_single: f64,
-    /// The ratio for a picture of a batch if the error went on with the measured exponent instead of −1/2.
-    pub(crate) equal_error_ratio_measured_exponent: f64,
-    /// The ratio for a picture of a batch where equal mean ΔE*76 is asked for, instead of equal relative error.
-    pub(crate) equal_delta_e_ratio: f64,
-    /// Pictures that the peer rendered, warming up included.
-    pub(crate) images: usize,
+    #[serde(flatten)]
+    pub(crate) cost: PictureCost,
+    #[serde(flatten)]
+    pub(crate) equal: EqualError,
 }
 
 /// A variant of the peer.
@@ -72,7 +69,7 @@ pub(crate) struct PeerReport {
 pub(crate) struct Variant {
     pub(crate) name: &'static str,
     pub(crate) samples: u32,
-    /// CPU seconds of all threads, after a first picture that does not count.
+    /// CPU seconds of all threads.
     pub(crate) cpu_s: f64,
 }
 
@@ -81,7 +78,7 @@ pub(crate) struct Variant {
 pub(crate) struct Run {
     /// Samples per pixel.
     pub(crate) samples: u32,
-    /// CPU seconds of all threads for one picture, compilation left out.
+    /// CPU seconds of all threads for the faster of two pictures; the other may have had to be compiled.
     pub(crate) cpu_s: f64,
     pub(crate) wall_s: f64,
     /// Root mean square of the noise over that of the values, on the subject's pixels.
@@ -91,124 +88,107 @@ pub(crate) struct Run {
 }
 
 impl PeerReport {
-    /// Measures the peer and our error for the same picture.
+    /// Measures the peer and our errors for the same pictures.
     pub(crate) fn measure(
         installation: &Installation,
         stage: &Stage,
         effort: &Effort,
-        timing: &Timing,
     ) -> anyhow::Result<Self> {
-        let Named { name: material_name, material } = materials::gold(ROUGHNESS)?;
-        let progress = spinner("");
-        let mut studio = Studio { worker: None, images: 0, stage };
-        let names: &[&str] =
-            if installation.llvm.is_some() { &["scalar_rgb", "llvm_ad_rgb"] } else { &["scalar_rgb"] };
-        let mut variants = Vec::new();
-        for name in names.iter().copied() {
-            progress.set_message(format!("Mitsuba: timing {name}"));
-            match studio.variant(installation, name, effort, &material) {
-                Ok(variant) => variants.push(variant),
-                // A library that cannot be used must not end the comparison.
-                Err(error) if !variants.is_empty() => {
-                    eprintln!("note: Mitsuba's {name} is left out: {error}")
-                }
-                Err(error) => return Err(error),
-            }
-        }
-        let best = variants.iter().min_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s)).map_or(names[0], |v| v.name);
-        progress.set_message("Mitsuba: rendering");
-        studio.start(installation, best, effort, &material)?;
-        let [few, some, many] = effort.peer_samples;
-        let mut runs = vec![studio.run(few)?, studio.run(some)?, studio.run(many)?];
-        let converged = studio.pair(effort.peer_converged)?;
-        runs.push(studio.measured(&converged));
-        progress.set_message("tracing paths");
-        let [bias, ours] = differences(stage, effort, &material, &converged)?;
+        let progress = spinner("Mitsuba: choosing a variant");
+        let materials = shared()?;
+        let mut studio = Studio { installation, stage, effort, variant: SLOW };
+        let (variants, version) = studio.variants(&materials[0].material, &progress)?;
+        let fastest = variants.iter().min_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
+        studio.variant = fastest.map_or(SLOW, |v| v.name);
+        let compare = |named: Named| {
+            progress.set_message(format!("Mitsuba: {}", named.name));
+            studio.compare(named)
+        };
+        let comparisons = materials.into_iter().map(compare).collect::<anyhow::Result<Vec<_>>>()?;
         progress.finish_and_clear();
-        let equal = Equal::new(&runs, &ours, timing);
         Ok(Self {
             name: "Mitsuba 3",
-            version: studio.worker.map(|w| w.version.clone()).unwrap_or_default(),
+            version,
             sampler: SAMPLER,
             llvm: installation.llvm.as_ref().map(|path| path.display().to_string()),
-            material_name,
-            material,
+            // Each measurement takes two.
+            images: 2 * (variants.len() + comparisons.iter().map(|c| c.runs.len()).sum::<usize>()),
             variants,
-            variant: best,
-            exponent: equal.exponent,
-            // Products of independent errors have a mean of 0; that of so many pixels is off by their root.
-            bias_threshold: runs.last().map_or(f64::NAN, |r| r.mean_delta_e)
-                / (effort.pixels as f64).powf(0.25),
-            runs,
-            bias,
-            ours,
-            equal_error_samples: equal.samples,
-            equal_error_cpu_s: equal.cpu_s,
-            equal_error_ratio: equal.ratio,
-            equal_error_ratio_single: equal.ratio_single,
-            equal_error_ratio_measured_exponent: equal.ratio_measured_exponent,
-            equal_delta_e_ratio: equal.delta_e_ratio,
-            images: studio.images,
+            variant: studio.variant,
+            comparisons,
         })
     }
+
+    /// The least ratio of the materials that were compared.
+    pub(crate) fn equal_error_ratio(&self) -> f64 {
+        self.comparisons.iter().map(|c| c.equal.equal_error_ratio).fold(f64::INFINITY, f64::min)
+    }
 }
+
+/// The variant that always works, and the one that needs LLVM.
+const SLOW: &str = "scalar_rgb";
+const FAST: &str = "llvm_ad_rgb";
 
 /// The peer at work.
 struct Studio<'a> {
-    worker: Option<Worker>,
-    images: usize,
+    installation: &'a Installation,
     stage: &'a Stage,
+    effort: &'a Effort,
+    variant: &'static str,
 }
 
 impl Studio<'_> {
-    fn start(
-        &mut self,
-        installation: &Installation,
-        variant: &'static str,
-        effort: &Effort,
+    fn worker(&self, variant: &str, material: &Material) -> anyhow::Result<Worker> {
+        Worker::start(self.installation, variant, (&self.stage.scene, self.effort.size), material)
+    }
+
+    /// Times the variants; also the peer's version.
+    fn variants(
+        &self,
         material: &Material,
-    ) -> anyhow::Result<()> {
-        let scene = (&self.stage.scene, effort.size);
-        self.worker = Some(Worker::start(installation, variant, scene, material)?);
-        Ok(())
+        progress: &ProgressBar,
+    ) -> anyhow::Result<(Vec<Variant>, String)> {
+        let time = |name| {
+            let mut worker = self.worker(name, material)?;
+            let Run { samples, cpu_s, .. } = self.run(&mut worker, self.effort.peer_samples[0])?.1;
+            anyhow::Ok((Variant { name, samples, cpu_s }, worker.version.clone()))
+        };
+        let (slow, version) = time(SLOW)?;
+        let mut variants = vec![slow];
+        if self.installation.llvm.is_some() {
+            match time(FAST) {
+                Ok((fast, _)) => variants.push(fast),
+                // A library that cannot be used must not end the comparison.
+                Err(error) => progress.suspend(|| {
+                    eprintln!("note: Mitsuba's {FAST} is left out ({LLVM_HINT}): {error}");
+                }),
+            }
+        }
+        Ok((variants, version))
     }
 
-    fn render(&mut self, samples: u32, seed: u32) -> anyhow::Result<Picture> {
-        self.images += 1;
-        let worker = self.worker.as_mut().ok_or_else(|| anyhow::anyhow!("the peer was not started"))?;
-        worker.render(samples, seed)
+    fn compare(&self, Named { name, material }: Named) -> anyhow::Result<Comparison> {
+        let mut worker = self.worker(self.variant, &material)?;
+        let mut runs = Vec::new();
+        for samples in self.effort.peer_samples {
+            runs.push(self.run(&mut worker, samples)?.1);
+        }
+        let (converged, last) = self.run(&mut worker, self.effort.peer_converged)?;
+        runs.push(last);
+        let [bias, ours] = differences(self.stage, self.effort, &material, &converged)?;
+        let cost = PictureCost::measure(self.stage, self.effort, &material)?;
+        let equal = EqualError::new(&runs, &ours, &cost);
+        // Products of independent errors have a mean of 0; that of so many pixels is off by their root.
+        let bias_threshold = last.mean_delta_e / (self.effort.pixels as f64).powf(0.25);
+        Ok(Comparison { name, material, runs, bias, bias_threshold, ours, cost, equal })
     }
 
-    /// Times a variant.
-    fn variant(
-        &mut self,
-        installation: &Installation,
-        name: &'static str,
-        effort: &Effort,
-        material: &Material,
-    ) -> anyhow::Result<Variant> {
-        self.start(installation, name, effort, material)?;
-        let Run { samples, cpu_s, .. } = self.run(effort.peer_samples[0])?;
-        Ok(Variant { name, samples, cpu_s })
-    }
-
-    /// Two pictures that differ in their seeds.
-    fn pair(&mut self, samples: u32) -> anyhow::Result<[Picture; 2]> {
-        Ok([self.render(samples, 1)?, self.render(samples, 2)?])
-    }
-
-    /// Time and noise at some number of samples. A first picture, which may have to be compiled, does not count.
-    fn run(&mut self, samples: u32) -> anyhow::Result<Run> {
-        self.render(samples, 0)?;
-        let pair = self.pair(samples)?;
-        Ok(self.measured(&pair))
-    }
-
-    /// The lesser time and the noise of two pictures.
-    fn measured(&self, [a, b]: &[Picture; 2]) -> Run {
+    /// Two pictures that differ in their seeds, the lesser time, and their noise.
+    fn run(&self, worker: &mut Worker, samples: u32) -> anyhow::Result<([Picture; 2], Run)> {
+        let [a, b] = [worker.render(samples, 1)?, worker.render(samples, 2)?];
         let Cost { samples, cpu_s, wall_s } = if a.cost.cpu_s < b.cost.cpu_s { a.cost } else { b.cost };
         let (relative_rmse, mean_delta_e) = noise(&a.image, &b.image, self.stage.environment.subjects());
-        Run { samples, cpu_s, wall_s, relative_rmse, mean_delta_e }
+        Ok(([a, b], Run { samples, cpu_s, wall_s, relative_rmse, mean_delta_e }))
     }
 }
 
@@ -241,33 +221,44 @@ fn differences(
 }
 
 /// What the peer needs for our error.
-struct Equal {
-    exponent: f64,
-    samples: f64,
-    cpu_s: f64,
-    ratio: f64,
-    ratio_single: f64,
-    ratio_measured_exponent: f64,
-    delta_e_ratio: f64,
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct EqualError {
+    /// The power of the number of samples that the peer's error follows between its last two runs.
+    pub(crate) exponent: f64,
+    /// Samples per pixel that give the peer our relative error: extrapolated where no run has as little.
+    pub(crate) equal_error_samples: f64,
+    /// CPU seconds that they take.
+    pub(crate) equal_error_cpu_s: f64,
+    /// That over our CPU time for a picture, as one of a batch.
+    pub(crate) equal_error_ratio: f64,
+    /// The same, but for a picture on its own.
+    pub(crate) equal_error_ratio_single: f64,
+    /// The ratio for a picture of a batch if the error went on with the measured exponent instead of −1/2.
+    pub(crate) equal_error_ratio_measured_exponent: f64,
+    /// The ratio for a picture of a batch where equal mean ΔE*76 is asked for, instead of equal relative error.
+    pub(crate) equal_delta_e_ratio: f64,
 }
 
-impl Equal {
-    fn new(runs: &[Run], ours: &Difference, timing: &Timing) -> Self {
+impl EqualError {
+    fn new(runs: &[Run], ours: &Difference, cost: &PictureCost) -> Self {
         let rmse = Law::new(runs, |run| run.relative_rmse);
         let delta_e = Law::new(runs, |run| run.mean_delta_e);
         // The run with the most samples has the least overhead.
         let cpu_s_per_sample = runs.last().map_or(f64::NAN, |run| run.cpu_s / f64::from(run.samples));
-        let in_batch = timing.environment_image_cpu_ms;
         let over = |samples: f64, milliseconds: f64| 1e3 * samples * cpu_s_per_sample / milliseconds;
+        let exponent = rmse.exponent();
         let samples = rmse.samples(ours.relative_rmse, -0.5);
         Self {
-            exponent: rmse.exponent(),
-            samples,
-            cpu_s: samples * cpu_s_per_sample,
-            ratio: over(samples, in_batch),
-            ratio_single: over(samples, timing.environment_single_cpu_ms),
-            ratio_measured_exponent: over(rmse.samples(ours.relative_rmse, rmse.exponent()), in_batch),
-            delta_e_ratio: over(delta_e.samples(ours.mean_delta_e, -0.5), in_batch),
+            exponent,
+            equal_error_samples: samples,
+            equal_error_cpu_s: samples * cpu_s_per_sample,
+            equal_error_ratio: over(samples, cost.image_cpu_ms),
+            equal_error_ratio_single: over(samples, cost.single_image_cpu_ms),
+            equal_error_ratio_measured_exponent: over(
+                rmse.samples(ours.relative_rmse, exponent),
+                cost.image_cpu_ms,
+            ),
+            equal_delta_e_ratio: over(delta_e.samples(ours.mean_delta_e, -0.5), cost.image_cpu_ms),
         }
     }
 }
@@ -314,17 +305,17 @@ mod tests {
             mean_delta_e: 10.0 * relative_rmse,
         };
         let difference = Difference { relative_rmse: 0.01, mean_delta_e: 0.2, ..Difference::default() };
-        let timing =
-            Timing { environment_image_cpu_ms: 2.0, environment_single_cpu_ms: 4.0, ..Timing::default() };
-        let equal = Equal::new(&[run(64, 0.2), run(256, 0.1)], &difference, &timing);
-        assert!((equal.exponent + 0.5).abs() < 1e-12);
-        assert!((equal.samples / 25_600.0 - 1.0).abs() < 1e-9);
-        assert!((equal.cpu_s / 2_560.0 - 1.0).abs() < 1e-9);
-        assert!(
-            (equal.ratio / 1.28e6 - 1.0).abs() < 1e-9 && (equal.ratio_single / 0.64e6 - 1.0).abs() < 1e-9
-        );
-        assert!((equal.ratio_measured_exponent / equal.ratio - 1.0).abs() < 1e-9);
-        assert!((equal.delta_e_ratio / 3.2e5 - 1.0).abs() < 1e-9);
+        let cost = PictureCost { image_cpu_ms: 2.0, single_image_cpu_ms: 4.0 };
+        let equal = EqualError::new(&[run(64, 0.2), run(256, 0.1)], &difference, &cost);
+        let is =
+            |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1e-9, "{value} {expected}");
+        is(equal.exponent, -0.5);
+        is(equal.equal_error_samples, 25_600.0);
+        is(equal.equal_error_cpu_s, 2_560.0);
+        is(equal.equal_error_ratio, 1.28e6);
+        is(equal.equal_error_ratio_single, 0.64e6);
+        is(equal.equal_error_ratio_measured_exponent, 1.28e6);
+        is(equal.equal_delta_e_ratio, 3.2e5);
     }
 
     #[test]

@@ -102,11 +102,13 @@ impl Drop for Worker {
     }
 }
 
-/// The last line of a log that says anything.
+/// The last line of a log that names an error, or says anything.
 fn last_words(log: &Path) -> String {
-    let text = std::fs::read(log).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    let line = |text: String| text.lines().rev().find(|l| !l.trim().is_empty()).map(str::to_owned);
-    text.ok().and_then(line).unwrap_or_else(|| "it said nothing".into())
+    let text =
+        std::fs::read(log).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default();
+    let mut lines = text.lines().rev().filter(|line| !line.trim().is_empty());
+    let named = lines.clone().find(|line| line.to_lowercase().contains("error"));
+    named.or_else(|| lines.next()).unwrap_or("it said nothing").to_owned()
 }
 
 /// The same map for the peer's look-up, whose first and last rows lie at the poles: with rows between ours that are
