@@ -73,6 +73,15 @@ pub(crate) struct RenderArgs {
     /// Leave the specular lobe out
     #[arg(long)]
     pub(crate) diffuse_only: bool,
+    /// transport (fast, without noise, spheres alone) or path (slow, exact, spheres and meshes)
+    #[arg(long, default_value = "transport")]
+    pub(crate) renderer: String,
+    /// Samples per pixel of the path renderer
+    #[arg(long, default_value_t = 256)]
+    pub(crate) samples: u32,
+    /// Seed of the path renderer: other seeds give other noise
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
     /// The picture: .exr (linear, exact) or .png (8 bit sRGB)
     #[arg(short, long)]
     pub(crate) output: PathBuf,

@@ -96,6 +96,27 @@ fn a_picture_is_the_same_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_picture_is_traced() {
+    let folder = TempDir::new().unwrap();
+    let render = |more: &[&'static str]| {
+        let base = ["render", "reference", "-m", "ggx:roughness=0.1", "-l", "point", "--size", "16", "-o", "o.exr"];
+        with(&base, more)
+    };
+    let summary = json(folder.path(), &render(&["--renderer", "path", "--samples", "16", "--seed", "7", "--json"]));
+    assert_eq!((&summary["renderer"], &summary["samples"]), (&"path".into(), &16.into()));
+    let traced = lookmatch_imaging::read(&folder.path().join("o.exr")).unwrap();
+    let summary = json(folder.path(), &render(&["--json"]));
+    assert_eq!((&summary["renderer"], &summary["samples"]), (&"transport".into(), &Json::Null));
+    let precomputed = lookmatch_imaging::read(&folder.path().join("o.exr")).unwrap();
+    let sum = |image: &lookmatch_imaging::Image| image.pixels().iter().flatten().sum::<f32>();
+    assert!((sum(&traced) / sum(&precomputed) - 1.0).abs() < 0.1, "{} {}", sum(&traced), sum(&precomputed));
+    std::fs::remove_file(folder.path().join("o.exr")).unwrap();
+    refused(folder.path(), &render(&["--renderer", "raster"]), 2, &["'raster'", "transport", "path"]);
+    refused(folder.path(), &render(&["--renderer", "path", "--samples", "0"]), 1, &["0 samples", "1048576"]);
+    assert!(!folder.path().join("o.exr").exists());
+}
+
+#[test]
 fn a_probe_is_found_applied_inspected_and_judged() {
     let folder = TempDir::new().unwrap();
     let made = json(folder.path(), &with(REMAP, &["--mask", "--report", "report", "-o", "p.json", "--json"]));

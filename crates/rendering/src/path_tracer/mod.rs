@@ -120,7 +120,7 @@ impl PathTracer {
         let (x, y) = (pixel as usize % self.film.size, pixel as usize / self.film.size);
         let sample = |index| {
             let sampler = self.points.path(self.seed, pixel, index);
-            let [dx, dy] = sampler.set(0).first();
+            let [dx, dy] = sampler.set(0).pair(0, 0);
             self.seen(coat, self.film.direction(x as f64 + dx, y as f64 + dy), &sampler)
         };
         (0..self.samples).map(sample).sum::<DVec3>() / f64::from(self.samples)
@@ -142,10 +142,11 @@ impl PathTracer {
     /// Radiance that a point reflects to where it is seen from.
     fn reflected(&self, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
         let splits = if walk.depth == 0 { SPLITS } else { 1 };
-        let set = sampler.set(walk.depth * SPLITS + walk.branch);
-        let mut sum = self.from_lights(vertex) + self.from_sky(vertex, set.second(0), splits);
+        let numbers = walk.numbers(sampler);
+        let mut sum = self.from_lights(vertex);
         for k in 0..splits {
-            let [u, v] = set.second(1 + k);
+            sum += self.from_sky(vertex, numbers(2 * k)) / f64::from(splits);
+            let [u, v] = numbers(2 * k + 1);
             // One number chooses between the parts of the mixture: dealt out evenly over the paths.
             let u = (f64::from(k) + u) / f64::from(splits);
             let Some(direction) = vertex.sample([u, v]) else { continue };
@@ -153,16 +154,14 @@ impl PathTracer {
             let density = scattering.density * f64::from(splits);
             let Some(at) = self.world.first(vertex.at.position, direction, Some(vertex.at.surface)) else {
                 if let Some(sky) = &self.sky {
-                    sum += scattering.value * sky.radiance(direction) / (density + sky.density(direction));
+                    sum += scattering.value * sky.radiance(direction)
+                        / (scattering.density + sky.density(direction)) / f64::from(splits);
                 }
                 continue;
             };
             let branch = if walk.depth == 0 { k } else { walk.branch };
-            let strength = walk.strength * scattering.value.max_element() / scattering.density;
-            let Some((walk, chance)) = (Walk { depth: walk.depth + 1, branch, strength }).survive(sampler)
-            else {
-                continue;
-            };
+            let next_walk = Walk { depth: walk.depth + 1, branch, strength: walk.strength * vertex.albedo };
+            let Some((walk, chance)) = next_walk.survive(sampler) else { continue };
             let next = self.vertex(vertex.coat(), at, -direction);
             sum += scattering.value * self.reflected(&next, sampler, walk) / (density * chance);
         }
@@ -185,12 +184,12 @@ impl PathTracer {
     }
 
     /// What a point reflects of the environment, by a direction drawn from its map.
-    fn from_sky(&self, vertex: &Vertex, numbers: [f64; 2], splits: u32) -> DVec3 {
+    fn from_sky(&self, vertex: &Vertex, numbers: [f64; 2]) -> DVec3 {
         let Some(sky) = &self.sky else { return DVec3::ZERO };
         let (direction, density) = sky.sample(numbers);
         match vertex.scatter(direction) {
             Some(s) if !self.hides(vertex, direction, f64::INFINITY) => {
-                s.value * sky.radiance(direction) / (density + s.density * f64::from(splits))
+                s.value * sky.radiance(direction) / (density + s.density)
             }
             _ => DVec3::ZERO,
         }
@@ -208,12 +207,24 @@ struct Walk {
     depth: u32,
     /// Which of the paths from the first point this is.
     branch: u32,
-    /// About the share of the light that arrives at the eye.
+    /// About the share of light that arrives at the eye: the product of the albedos. The weight of a path would not do,
+    /// because one that is aimed at a bright spot weighs little until it meets it.
     strength: f64,
 }
 
 impl Walk {
     const START: Self = Self { depth: 0, branch: 0, strength: 1.0 };
+
+    /// Pairs of numbers for what is decided at a point: even streams for the environment, odd ones for the path's own
+    /// direction.
+    fn numbers<'a>(self, sampler: &Sampler<'a>) -> impl Fn(u32) -> [f64; 2] + use<'a> {
+        // The first points of all branches share one set with the pixel's area, deeper ones have sets of their own.
+        let place = self.depth + 1;
+        let number = if place < 4 { 0 } else { place / 4 * SPLITS + self.branch };
+        let set = sampler.set(number);
+        let stream = if self.depth == 0 { 0 } else { (1 + self.branch) * 2 * SPLITS };
+        move |k| set.pair(place % 4, stream + k)
+    }
 
     /// Ends weak paths by chance (Russian roulette); those that go on get the chance that they had.
     fn survive(self, sampler: &Sampler) -> Option<(Self, f64)> {
@@ -221,7 +232,7 @@ impl Walk {
             return Some((self, 1.0));
         }
         let chance = self.strength.min(0.95);
-        let [u, _] = sampler.set(self.depth * SPLITS + self.branch).first();
+        let [u, _] = self.numbers(sampler)(2);
         let walk = Self { strength: self.strength / chance, ..self };
         (u < chance && self.depth < LONGEST).then_some((walk, chance))
     }

@@ -1,17 +1,23 @@
-//! Random numbers of paths: Owen-scrambled Sobol' points, four dimensions at a time.
+//! Random numbers of paths: Owen-scrambled Sobol' points, eight dimensions at a time.
 //!
-//! The points of a pixel are those of one four-dimensional sequence. A path needs more dimensions; each further set of
-//! four takes the same points in another order and with another scramble ("padding", Burley 2020). Shuffles and
-//! scrambles follow from the seed, the pixel and the set alone.
+//! The points of a pixel are those of one sequence of eight dimensions: its area and the first three points of a path
+//! take two each. Long paths need more; each further set takes the same points in another order and with other scrambles
+//! ("padding", Burley 2020). Shuffles and scrambles follow from the seed, the pixel and the set alone.
 
-/// Direction numbers of the second to fourth dimension (Joe & Kuo 2008): degree and coefficients of the primitive
-/// polynomial, initial numbers. The first dimension is van der Corput's.
-const POLYNOMIALS: [(u32, u32, [u32; 3]); 3] = [(1, 0, [1, 0, 0]), (2, 1, [1, 3, 0]), (3, 1, [1, 3, 1])];
+/// Dimensions of the sequence.
+const DIMENSIONS: usize = 8;
+
+/// Direction numbers of all dimensions but the first, which is van der Corput's (Joe & Kuo 2008): coefficients of the
+/// primitive polynomial, and as many initial numbers as its degree.
+#[rustfmt::skip]
+const POLYNOMIALS: [(u32, &[u32]); DIMENSIONS - 1] = [
+    (0, &[1]), (1, &[1, 3]), (1, &[1, 3, 1]), (2, &[1, 1, 1]), (1, &[1, 1, 3, 3]), (4, &[1, 3, 5, 13]), (2, &[1, 1, 5, 5, 17]),
+];
 
 /// The first points of the Sobol' sequence, their bits reversed: what the scrambling works on.
 #[derive(Debug)]
 pub(super) struct Points {
-    reversed: Vec<[u32; 4]>,
+    reversed: Vec<[u32; DIMENSIONS]>,
 }
 
 impl Points {
@@ -32,13 +38,13 @@ impl Points {
 /// The random numbers of one path.
 #[derive(Clone, Copy)]
 pub(super) struct Sampler<'a> {
-    points: &'a [[u32; 4]],
+    points: &'a [[u32; DIMENSIONS]],
     seed: u32,
     index: u32,
 }
 
 impl Sampler<'_> {
-    /// The set of four dimensions with a number of its own.
+    /// The set of dimensions with a number of its own.
     pub(super) fn set(&self, number: u32) -> Set {
         let seed = hash(self.seed.wrapping_add(number.wrapping_mul(0x9e37_79b9)));
         let shuffled = scramble(self.index.reverse_bits(), seed).reverse_bits();
@@ -46,35 +52,31 @@ impl Sampler<'_> {
     }
 }
 
-/// Four dimensions that are stratified together.
+/// Dimensions that are stratified together.
 #[derive(Clone, Copy)]
 pub(super) struct Set {
-    reversed: [u32; 4],
+    reversed: [u32; DIMENSIONS],
     seed: u32,
 }
 
 impl Set {
-    /// Dimensions 0 and 1.
-    pub(super) fn first(&self) -> [f64; 2] {
-        [self.number(0, 0), self.number(1, 0)]
+    /// Two numbers in `(0, 1)` from a pair of dimensions, 0 to 3. Each stream scrambles them anew; all are stratified
+    /// together with the other pairs.
+    pub(super) fn pair(&self, pair: u32, stream: u32) -> [f64; 2] {
+        [self.number(2 * pair, stream), self.number(2 * pair + 1, stream)]
     }
 
-    /// Dimensions 2 and 3. Each stream scrambles them anew: all are stratified together with the first pair.
-    pub(super) fn second(&self, stream: u32) -> [f64; 2] {
-        [self.number(2, stream), self.number(3, stream)]
-    }
-
-    fn number(&self, dimension: usize, stream: u32) -> f64 {
-        let seed = hash(self.seed ^ (1 + dimension as u32 + 4 * stream).wrapping_mul(0x85eb_ca6b));
-        let bits = scramble(self.reversed[dimension], seed).reverse_bits();
+    fn number(&self, dimension: u32, stream: u32) -> f64 {
+        let seed = hash(self.seed ^ (1 + dimension + DIMENSIONS as u32 * stream).wrapping_mul(0x85eb_ca6b));
+        let bits = scramble(self.reversed[dimension as usize], seed).reverse_bits();
         (f64::from(bits) + 0.5) / 4_294_967_296.0
     }
 }
 
 fn direction_numbers(dimension: usize) -> [u32; 32] {
     let Some(k) = dimension.checked_sub(1) else { return std::array::from_fn(|i| 1 << (31 - i)) };
-    let (degree, coefficients, initial) = POLYNOMIALS[k];
-    let degree = degree as usize;
+    let (coefficients, initial) = POLYNOMIALS[k];
+    let degree = initial.len();
     let mut v = [0u32; 32];
     for i in 0..32 {
         v[i] = match i < degree {
@@ -113,21 +115,20 @@ fn hash(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Every elementary interval of each pair of dimensions holds one of 2^k points: nothing is lost by scrambling,
-    /// shuffling and padding. The pairs are (0, 2)-sequences up to a factor of 2, the quality of Sobol's dimensions 3, 4.
+    /// Elementary intervals of each pair of dimensions hold one of 2^k points, up to the quality of Sobol's dimensions:
+    /// nothing is lost by scrambling, shuffling and padding.
     #[test]
     fn sets_are_stratified() {
         let count = 256;
         let points = Points::new(count);
         for (pixel, number) in [(0, 0), (7, 1), (1_000_000, 77)] {
             let set = |i| points.path(5, pixel, i).set(number);
-            let pairs: [fn(Set) -> [f64; 2]; 3] = [|s| s.first(), |s| s.second(0), |s| s.second(3)];
-            for (pair, most) in pairs.into_iter().zip([1, 2, 2]) {
+            for (pair, stream, most) in [(0, 0, 1), (0, 1, 1), (1, 0, 2), (1, 3, 2), (2, 0, 8), (3, 0, 16)] {
                 for log in 0..=8 {
                     let (columns, rows) = (1 << log, count as usize >> log);
                     let mut counts = vec![0; columns * rows];
                     for i in 0..count {
-                        let [u, v] = pair(set(i));
+                        let [u, v] = set(i).pair(pair, stream);
                         counts[(u * columns as f64) as usize * rows + (v * rows as f64) as usize] += 1;
                     }
                     assert!(counts.iter().all(|c| *c <= most), "{columns} x {rows}: {counts:?}");
@@ -140,7 +141,7 @@ mod tests {
     fn seeds_pixels_and_sets_are_unrelated() {
         let points = Points::new(1024);
         let numbers = |seed, pixel, set| -> Vec<f64> {
-            (0..1024).map(|i| points.path(seed, pixel, i).set(set).first()[0] - 0.5).collect()
+            (0..1024).map(|i| points.path(seed, pixel, i).set(set).pair(0, 0)[0] - 0.5).collect()
         };
         let one = numbers(1, 1, 1);
         for other in [numbers(2, 1, 1), numbers(1 << 40, 1, 1), numbers(1, 2, 1), numbers(1, 1, 2)] {

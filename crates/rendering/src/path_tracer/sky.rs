@@ -83,11 +83,10 @@ impl Sky {
         (self.edge(row) - self.edge(row + 1)) * TAU / self.width() as f64
     }
 
-    /// Luminance in the middle of a texel.
+    /// Sum of the channels in the middle of a texel. Luminance would starve blue light, which is worth as much here.
     fn brightness(&self, x: usize, y: usize) -> f64 {
         let at = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
-        let radiance = self.radiance(map_direction(at(x, self.width()) + self.rotation, at(y, self.height)));
-        lookmatch_imaging::luminance(radiance.as_vec3().to_array()).into()
+        self.radiance(map_direction(at(x, self.width()) + self.rotation, at(y, self.height))).element_sum()
     }
 }
 

@@ -50,6 +50,8 @@ pub(super) struct Vertex<'a> {
     /// `None` where there is no lobe.
     lobe: Option<Lobe>,
     shares: Shares,
+    /// About the share of light that is reflected.
+    pub(super) albedo: f64,
 }
 
 /// How often each part of the mixture is drawn; their sum is 1.
@@ -82,18 +84,20 @@ impl<'a> Vertex<'a> {
         let wo = if is_board { [0.0, 0.0, 1.0] } else { to_local(&at.frame, to_viewer) };
         let lobe = coat.lobe.filter(|_| !is_board);
         let shares = Shares { lobe: 0.0, cosine: 1.0, spheres: 0.0 };
-        let mut vertex = Self { at, coat, targets, wo, diffuse, lobe, shares };
-        vertex.shares = vertex.fair_shares();
+        let mut vertex = Self { at, coat, targets, wo, diffuse, lobe, shares, albedo: 0.0 };
+        let reflectance = vertex.lobe.map_or(0.0, |l| vertex.mirror_reflectance(&l));
+        vertex.shares = vertex.fair_shares(reflectance);
+        vertex.albedo = reflectance + diffuse.max_element();
         vertex
     }
 
-    fn fair_shares(&self) -> Shares {
-        let reflectance = self.lobe.map_or(0.0, |l| self.mirror_reflectance(&l));
+    fn fair_shares(&self, reflectance: f64) -> Shares {
         let diffuse = self.diffuse.element_sum() / 3.0;
         let lobe = match (self.lobe, diffuse > 0.0) {
             (None, _) => 0.0,
-            (_, false) => 1.0,
-            _ => (reflectance / (reflectance + diffuse)).clamp(0.1, 0.9),
+            // Wide lobes are not quite where their samples are, which may lie below the surface.
+            (Some(lobe), false) => 1.0 - 0.5 * lobe.alpha.min(1.0),
+            (Some(_), true) => (reflectance / (reflectance + diffuse)).clamp(0.1, 0.9),
         };
         let spheres = if self.visible_spheres().count() > 0 { SPHERES } else { 0.0 };
         Shares { lobe, cosine: (1.0 - lobe) * (1.0 - spheres), spheres: (1.0 - lobe) * spheres }
