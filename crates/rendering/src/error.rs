@@ -77,7 +77,9 @@ pub enum SceneError {
         message: String,
     },
     /// The scene has meshes, but the renderer knows spheres alone.
-    #[error("scene '{scene}' has meshes; the renderer 'transport' takes spheres alone, the renderer 'path' takes both")]
+    #[error(
+        "scene '{scene}' has meshes; the renderer 'transport' takes spheres alone, the renderer 'path' takes both"
+    )]
     NeedsPath {
         /// Name of the scene.
         scene: String,

@@ -61,7 +61,13 @@ pub static RENDERERS: [RendererEntry; 2] = [
     RendererEntry { name: "path", about: "path tracing: slow, noisy, right; spheres and meshes, all bounces", is_sampled: true, prepare: path },
 ];
 
-fn transport(scene: &Scene, light: Illumination, size: usize, _: u32, _: u64) -> Result<Box<dyn Render>, SceneError> {
+fn transport(
+    scene: &Scene,
+    light: Illumination,
+    size: usize,
+    _: u32,
+    _: u64,
+) -> Result<Box<dyn Render>, SceneError> {
     Ok(Box::new(Renderer::prepare(scene, light, size)?))
 }
 

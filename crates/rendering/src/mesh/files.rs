@@ -26,8 +26,8 @@ pub(super) fn read(path: &Path) -> Result<Soup, String> {
 fn obj(reader: &mut BufReader<File>) -> Result<Soup, String> {
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
     let no_materials = |_: &Path| Ok(Default::default());
-    let (models, _) =
-        tobj::load_obj_buf(reader, &options, no_materials).map_err(|error| format!("no OBJ file: {error}"))?;
+    let (models, _) = tobj::load_obj_buf(reader, &options, no_materials)
+        .map_err(|error| format!("no OBJ file: {error}"))?;
     let mut soup = Soup::default();
     let count: usize = models.iter().map(|m| m.mesh.positions.len() / 3).sum();
     for mesh in models.iter().map(|m| &m.mesh) {
@@ -40,7 +40,8 @@ fn obj(reader: &mut BufReader<File>) -> Result<Soup, String> {
         soup.normals.extend(vectors(&mesh.normals));
         soup.texture.extend(mesh.texcoords.chunks_exact(2).map(|t| [t[0].into(), t[1].into()]));
         let corner = |i: &u32| first + *i as usize;
-        soup.triangles.extend(mesh.indices.chunks_exact(3).map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]));
+        soup.triangles
+            .extend(mesh.indices.chunks_exact(3).map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]));
     }
     // Groups without normals or texture among others that have them: neither is used.
     if soup.normals.len() != count {

@@ -26,7 +26,12 @@ pub(super) struct Glint {
 impl Glint {
     /// For a lobe of width `alpha`; `None` where the point or the light lies within the sphere, or where no reflection
     /// is seen.
-    pub(super) fn new(point: DVec3, (centre, radius): (DVec3, f64), light: DVec3, alpha: f64) -> Option<Self> {
+    pub(super) fn new(
+        point: DVec3,
+        (centre, radius): (DVec3, f64),
+        light: DVec3,
+        alpha: f64,
+    ) -> Option<Self> {
         let (a, b) = (point - centre, light - centre);
         let (a_length, b_length) = (a.length(), b.length());
         if a_length <= radius || b_length <= radius {

@@ -143,9 +143,9 @@ impl PathTracer {
     fn reflected(&self, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
         let splits = if walk.depth == 0 { SPLITS } else { 1 };
         let numbers = walk.numbers(sampler);
-        let mut sum = self.from_lights(vertex);
+        let mut sum = self.lit_by_points(vertex);
         for k in 0..splits {
-            sum += self.from_sky(vertex, numbers(2 * k)) / f64::from(splits);
+            sum += self.lit_by_sky(vertex, numbers(2 * k)) / f64::from(splits);
             let [u, v] = numbers(2 * k + 1);
             // One number chooses between the parts of the mixture: dealt out evenly over the paths.
             let u = (f64::from(k) + u) / f64::from(splits);
@@ -155,7 +155,8 @@ impl PathTracer {
             let Some(at) = self.world.first(vertex.at.position, direction, Some(vertex.at.surface)) else {
                 if let Some(sky) = &self.sky {
                     sum += scattering.value * sky.radiance(direction)
-                        / (scattering.density + sky.density(direction)) / f64::from(splits);
+                        / (scattering.density + sky.density(direction))
+                        / f64::from(splits);
                 }
                 continue;
             };
@@ -169,7 +170,7 @@ impl PathTracer {
     }
 
     /// What a point reflects of the point lights.
-    fn from_lights(&self, vertex: &Vertex) -> DVec3 {
+    fn lit_by_points(&self, vertex: &Vertex) -> DVec3 {
         let from = |(position, intensity): &(DVec3, DVec3)| {
             let to_light = *position - vertex.at.position;
             let distance = to_light.length();
@@ -184,7 +185,7 @@ impl PathTracer {
     }
 
     /// What a point reflects of the environment, by a direction drawn from its map.
-    fn from_sky(&self, vertex: &Vertex, numbers: [f64; 2]) -> DVec3 {
+    fn lit_by_sky(&self, vertex: &Vertex, numbers: [f64; 2]) -> DVec3 {
         let Some(sky) = &self.sky else { return DVec3::ZERO };
         let (direction, density) = sky.sample(numbers);
         match vertex.scatter(direction) {

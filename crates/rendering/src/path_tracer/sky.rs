@@ -25,9 +25,11 @@ impl Sky {
         let (height, rotation) = map.grid();
         let mut sky = Self { map, rotation, height, rows: Vec::new(), columns: Vec::new() };
         let width = sky.width();
-        let brightness: Vec<f64> = (0..width * height).map(|i| sky.brightness(i % width, i / width)).collect();
+        let brightness: Vec<f64> =
+            (0..width * height).map(|i| sky.brightness(i % width, i / width)).collect();
         for y in 0..height {
-            let mut row: Vec<f64> = (0..width).map(|x| spread(&brightness, (width, height), (x, y))).collect();
+            let mut row: Vec<f64> =
+                (0..width).map(|x| spread(&brightness, (width, height), (x, y))).collect();
             let total = accumulate(&mut row);
             sky.columns.extend(row);
             sky.rows.push(total * sky.solid_angle(y));

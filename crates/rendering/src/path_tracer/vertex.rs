@@ -259,4 +259,3 @@ fn cosine_direction([u, v]: [f64; 2]) -> [f64; 3] {
     let sin = u.sqrt();
     [sin * cos_phi, sin * sin_phi, (1.0 - u).sqrt()]
 }
-

@@ -92,7 +92,9 @@ impl World {
         match encounter.surface {
             Surface::Sphere(k) => self.sphere_diffuse[k].unwrap_or(material),
             Surface::Mesh(k, _) => self.mesh_diffuse[k].unwrap_or(material),
-            Surface::Plane => self.plane.as_ref().map_or(DVec3::ZERO, |p| p.albedo(encounter.position).into()),
+            Surface::Plane => {
+                self.plane.as_ref().map_or(DVec3::ZERO, |p| p.albedo(encounter.position).into())
+            }
         }
     }
 
