@@ -4,8 +4,8 @@
 //! ways, by directions drawn from the map and by the path's own direction, weighted by the balance heuristic (Veach
 //! 1997); point lights are evaluated directly. What a path's direction is drawn from is told in [`vertex`].
 //!
-//! What remains hard is light that a mesh (not a sphere) with a narrow lobe throws onto a diffuse surface, and that which
-//! a sphere throws there from small, bright spots of an environment: caustics without a technique of their own.
+//! What remains hard are caustics without a technique of their own: light that a mesh (not a sphere) with a narrow lobe
+//! throws onto a diffuse surface, and that of further lamps of an environment with more than a few.
 
 mod glint;
 mod sampler;
@@ -47,6 +47,8 @@ pub struct PathTracer {
     sky: Option<Sky>,
     /// Position and intensity of the point lights.
     lights: Vec<(DVec3, DVec3)>,
+    /// Places of the point lights and of the environment's lamps.
+    spots: Vec<DVec3>,
     points: Points,
     samples: u32,
     seed: u64,
@@ -74,11 +76,15 @@ impl PathTracer {
         let map = scene.environment.as_ref().filter(|_| illumination.has_environment());
         let light = |l: &crate::PointLight| (l.position.into(), l.intensity.into());
         let lights = scene.point_lights.iter().filter(|_| illumination.has_points()).map(light);
+        let lights: Vec<(DVec3, DVec3)> = lights.collect();
+        let sky = map.map(EnvironmentMap::load).transpose()?.map(Sky::new);
+        let lamps = sky.as_ref().map_or(Vec::new(), Sky::spots);
         Ok(Self {
             world: World::new(scene)?,
             film: Film::new(&scene.camera, size),
-            sky: map.map(EnvironmentMap::load).transpose()?.map(Sky::new),
-            lights: lights.collect(),
+            spots: lights.iter().map(|l| l.0).chain(lamps).collect(),
+            sky,
+            lights,
             points: Points::new(samples),
             samples,
             seed,
@@ -135,7 +141,7 @@ impl PathTracer {
     }
 
     fn vertex<'a>(&'a self, coat: &'a Coat, at: Encounter, to_viewer: DVec3) -> Vertex<'a> {
-        let targets = Targets { spheres: &self.world.spheres, lights: &self.lights };
+        let targets = Targets { spheres: &self.world.spheres, lights: &self.spots };
         Vertex::new(at, to_viewer, self.world.diffuse(&at, coat.diffuse), coat, targets)
     }
 
