@@ -99,10 +99,12 @@ fn a_picture_is_the_same_on_any_number_of_threads() {
 fn a_picture_is_traced() {
     let folder = TempDir::new().unwrap();
     let render = |more: &[&'static str]| {
-        let base = ["render", "reference", "-m", "ggx:roughness=0.1", "-l", "point", "--size", "16", "-o", "o.exr"];
+        let base =
+            ["render", "reference", "-m", "ggx:roughness=0.1", "-l", "point", "--size", "16", "-o", "o.exr"];
         with(&base, more)
     };
-    let summary = json(folder.path(), &render(&["--renderer", "path", "--samples", "16", "--seed", "7", "--json"]));
+    let summary =
+        json(folder.path(), &render(&["--renderer", "path", "--samples", "16", "--seed", "7", "--json"]));
     assert_eq!((&summary["renderer"], &summary["samples"]), (&"path".into(), &16.into()));
     let traced = lookmatch_imaging::read(&folder.path().join("o.exr")).unwrap();
     let summary = json(folder.path(), &render(&["--json"]));

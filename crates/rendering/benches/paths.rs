@@ -47,7 +47,9 @@ fn main() {
                 let (bias, largest) = mean_difference(&a, &expected);
                 let rate = 2.0 * f64::from(samples) * pixels.len() as f64 / seconds / 1e6;
                 print!("{:<40} {samples:>6} spp: ", format!("{illumination:?} {text}"));
-                println!("noise {noise:.3}, at most {worst:.2}; to the precomputed {bias:.3}, at most {largest:.1}; {rate:.2} M/s");
+                println!(
+                    "noise {noise:.3}, at most {worst:.2}; to the precomputed {bias:.3}, at most {largest:.1}; {rate:.2} M/s"
+                );
             }
         }
     }
