@@ -32,6 +32,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Judge a probe in a scene that its search never saw
     Validate(ValidateArgs),
+    /// Measure speed and accuracy on this machine, alone or beside another renderer
+    Bench(BenchArgs),
 }
 
 #[derive(Args)]
@@ -204,6 +206,33 @@ pub(crate) struct ValidateArgs {
     #[arg(long, default_value_t = 300)]
     pub(crate) size: usize,
     /// Also write the result as JSON
+    #[arg(short, long)]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum PeerName {
+    /// Mitsuba 3, from the Python package index
+    Mitsuba,
+}
+
+#[derive(Args)]
+pub(crate) struct BenchArgs {
+    /// Also measure another renderer at equal error; it is installed on first use
+    #[arg(long, value_enum)]
+    pub(crate) peer: Option<PeerName>,
+    /// Folder for the peer's installation, instead of the user's cache
+    #[arg(long, value_name = "FOLDER", requires = "peer")]
+    pub(crate) peer_folder: Option<PathBuf>,
+    /// Paths per pixel of each of the two converged pictures that errors are measured against
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) samples: Option<u32>,
+    /// Tiny pictures and few paths: shows in seconds that everything works; its figures mean nothing
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Also write the tables to this file, as Markdown
     #[arg(short, long)]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]

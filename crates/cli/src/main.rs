@@ -4,6 +4,7 @@
 //! no sense, 1 a failure to carry it out.
 
 mod args;
+mod bench;
 mod commands;
 mod output;
 mod report;
@@ -37,6 +38,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
+        Command::Bench(args) => commands::bench::run(&args),
     }
 }
 

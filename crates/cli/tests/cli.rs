@@ -99,10 +99,12 @@ fn a_picture_is_the_same_on_any_number_of_threads() {
 fn a_picture_is_traced() {
     let folder = TempDir::new().unwrap();
     let render = |more: &[&'static str]| {
-        let base = ["render", "reference", "-m", "ggx:roughness=0.1", "-l", "point", "--size", "16", "-o", "o.exr"];
+        let base =
+            ["render", "reference", "-m", "ggx:roughness=0.1", "-l", "point", "--size", "16", "-o", "o.exr"];
         with(&base, more)
     };
-    let summary = json(folder.path(), &render(&["--renderer", "path", "--samples", "16", "--seed", "7", "--json"]));
+    let summary =
+        json(folder.path(), &render(&["--renderer", "path", "--samples", "16", "--seed", "7", "--json"]));
     assert_eq!((&summary["renderer"], &summary["samples"]), (&"path".into(), &16.into()));
     let traced = lookmatch_imaging::read(&folder.path().join("o.exr")).unwrap();
     let summary = json(folder.path(), &render(&["--json"]));
@@ -334,4 +336,80 @@ fn damaged_probes_are_refused() {
     damaged(&|p| p["entries"][0]["fitness"] = Json::Null, &["fitness"]);
     std::fs::write(of.join("cut.json"), "{\"format\": \"lookmatch-probe\"").unwrap();
     refused(of, &["apply", "cut.json", "specular=0.1"], 1, &["cut.json", "not JSON"]);
+}
+
+/// Keys of the benchmark's document that scripts rely on.
+const FIGURES: [&str; 8] = [
+    "image_pair_cpu_ms",
+    "single_pair_cpu_ms",
+    "prepare_cpu_s",
+    "metric_ms",
+    "metric_cached_ms",
+    "mean_delta_e",
+    "worst_delta_e",
+    "noise_delta_e",
+];
+
+/// Checks that figures are there, finite and above 0.
+fn has_figures(report: &Json, figures: &[&str]) {
+    for key in figures {
+        assert!(report[key].as_f64().is_some_and(|v| v.is_finite() && v > 0.0), "{key}: {}", report[key]);
+    }
+}
+
+#[test]
+fn the_benchmark_measures_what_it_promises() {
+    let folder = TempDir::new().unwrap();
+    let report = json(folder.path(), &["bench", "--quick", "--json", "-o", "performance.md"]);
+    has_figures(&report, &FIGURES);
+    let materials = report["materials"].as_array().unwrap();
+    assert!(materials.len() >= 30);
+    assert!(materials.iter().all(|m| m["environment"]["mean_delta_e"].as_f64().unwrap() > 0.0));
+    assert_eq!(report["effort"]["samples"], 16);
+    assert!(report.get("peer").is_none());
+    let document = std::fs::read_to_string(folder.path().join("performance.md")).unwrap();
+    assert!(document.contains("| ggx-conductor, gold, α = 0.3 |"), "{document}");
+}
+
+/// Installs Mitsuba from the Python package index: `cargo xtask test` runs it, and so does `cargo test -- --ignored`.
+#[test]
+#[ignore = "installs a renderer"]
+fn the_benchmark_compares_with_mitsuba() {
+    let folder = TempDir::new().unwrap();
+    let command = ["bench", "--quick", "--samples", "64", "--peer", "mitsuba", "--json"];
+    let report = json(folder.path(), &command);
+    has_figures(&report, &FIGURES);
+    has_figures(&report, &["equal_error_ratio"]);
+    let comparisons = report["peer"]["comparisons"].as_array().unwrap();
+    assert_eq!(comparisons.len(), 2);
+    for comparison in comparisons {
+        has_figures(comparison, &["equal_error_cpu_s", "equal_error_ratio_single", "image_cpu_ms"]);
+        // Two path tracers that share nothing but the scene.
+        let brightness = comparison["bias"]["brightness"].as_f64().unwrap();
+        assert!(
+            brightness.abs() < 0.03,
+            "{}: Mitsuba's pictures are {brightness} brighter",
+            comparison["name"]
+        );
+    }
+}
+
+#[test]
+fn bad_benchmarks_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    refused(of, &["bench", "--peer", "blender"], 2, &["blender", "mitsuba"]);
+    refused(of, &["bench", "--samples", "0"], 2, &["--samples", "0"]);
+    refused(of, &["bench", "--peer-folder", "here"], 2, &["--peer"]);
+    refused(of, &["bench", "--quick", "-o", "no/performance.md"], 1, &["no folder"]);
+    std::fs::write(of.join("file"), "").unwrap();
+    refused(of, &["bench", "--quick", "--peer", "mitsuba", "--peer-folder", "file/x"], 1, &["file/x"]);
+    let output = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
+        .current_dir(of)
+        .env("PATH", "")
+        .args(["bench", "--quick", "--peer", "mitsuba", "--peer-folder", "peer"])
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && message.contains("no python3 on the PATH"), "{message}");
 }

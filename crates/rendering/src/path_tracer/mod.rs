@@ -4,8 +4,8 @@
 //! ways, by directions drawn from the map and by the path's own direction, weighted by the balance heuristic (Veach
 //! 1997); point lights are evaluated directly. What a path's direction is drawn from is told in [`vertex`].
 //!
-//! What remains hard is light that a mesh (not a sphere) with a narrow lobe throws onto a diffuse surface, and that which
-//! a sphere throws there from small, bright spots of an environment: caustics without a technique of their own.
+//! What remains hard are caustics without a technique of their own: light that a mesh (not a sphere) with a narrow lobe
+//! throws onto a diffuse surface, and that of further lamps of an environment with more than a few.
 
 mod glint;
 mod sampler;
@@ -47,6 +47,8 @@ pub struct PathTracer {
     sky: Option<Sky>,
     /// Position and intensity of the point lights.
     lights: Vec<(DVec3, DVec3)>,
+    /// Places of the point lights and of the environment's lamps.
+    spots: Vec<DVec3>,
     points: Points,
     samples: u32,
     seed: u64,
@@ -74,11 +76,15 @@ impl PathTracer {
         let map = scene.environment.as_ref().filter(|_| illumination.has_environment());
         let light = |l: &crate::PointLight| (l.position.into(), l.intensity.into());
         let lights = scene.point_lights.iter().filter(|_| illumination.has_points()).map(light);
+        let lights: Vec<(DVec3, DVec3)> = lights.collect();
+        let sky = map.map(EnvironmentMap::load).transpose()?.map(Sky::new);
+        let lamps = sky.as_ref().map_or(Vec::new(), Sky::spots);
         Ok(Self {
             world: World::new(scene)?,
             film: Film::new(&scene.camera, size),
-            sky: map.map(EnvironmentMap::load).transpose()?.map(Sky::new),
-            lights: lights.collect(),
+            spots: lights.iter().map(|l| l.0).chain(lamps).collect(),
+            sky,
+            lights,
             points: Points::new(samples),
             samples,
             seed,
@@ -135,7 +141,7 @@ impl PathTracer {
     }
 
     fn vertex<'a>(&'a self, coat: &'a Coat, at: Encounter, to_viewer: DVec3) -> Vertex<'a> {
-        let targets = Targets { spheres: &self.world.spheres, lights: &self.lights };
+        let targets = Targets { spheres: &self.world.spheres, lights: &self.spots };
         Vertex::new(at, to_viewer, self.world.diffuse(&at, coat.diffuse), coat, targets)
     }
 
@@ -143,9 +149,9 @@ impl PathTracer {
     fn reflected(&self, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
         let splits = if walk.depth == 0 { SPLITS } else { 1 };
         let numbers = walk.numbers(sampler);
-        let mut sum = self.from_lights(vertex);
+        let mut sum = self.lit_by_points(vertex);
         for k in 0..splits {
-            sum += self.from_sky(vertex, numbers(2 * k)) / f64::from(splits);
+            sum += self.lit_by_sky(vertex, numbers(2 * k)) / f64::from(splits);
             let [u, v] = numbers(2 * k + 1);
             // One number chooses between the parts of the mixture: dealt out evenly over the paths.
             let u = (f64::from(k) + u) / f64::from(splits);
@@ -170,7 +176,7 @@ impl PathTracer {
     }
 
     /// What a point reflects of the point lights.
-    fn from_lights(&self, vertex: &Vertex) -> DVec3 {
+    fn lit_by_points(&self, vertex: &Vertex) -> DVec3 {
         let from = |(position, intensity): &(DVec3, DVec3)| {
             let to_light = *position - vertex.at.position;
             let distance = to_light.length();
@@ -185,7 +191,7 @@ impl PathTracer {
     }
 
     /// What a point reflects of the environment, by a direction drawn from its map.
-    fn from_sky(&self, vertex: &Vertex, numbers: [f64; 2]) -> DVec3 {
+    fn lit_by_sky(&self, vertex: &Vertex, numbers: [f64; 2]) -> DVec3 {
         let Some(sky) = &self.sky else { return DVec3::ZERO };
         let (direction, density) = sky.sample(numbers);
         match vertex.scatter(direction) {

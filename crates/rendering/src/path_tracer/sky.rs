@@ -7,6 +7,13 @@ use glam::{DVec3, Vec4Swizzles};
 use crate::EnvironmentMap;
 use crate::angles::map_direction;
 
+/// Lamps whose reflections are searched for, at most; those within an angle of a brighter one (in radians) count as part
+/// of it.
+const MOST_SPOTS: usize = 4;
+const SPOT: f64 = 0.15;
+/// So far, in metres, that a direction is a place.
+const FAR: f64 = 1e6;
+
 /// An environment with a density of directions: constant over each texel, in proportion to the mean of the map there.
 #[derive(Debug)]
 pub(super) struct Sky {
@@ -41,6 +48,20 @@ impl Sky {
     /// Radiance from a unit direction.
     pub(super) fn radiance(&self, direction: DVec3) -> DVec3 {
         self.map.radiance(direction, 0.0).xyz().as_dvec3()
+    }
+
+    /// Places far away in the directions of the brightest lamps of the map, one for each spot.
+    pub(super) fn spots(&self) -> Vec<DVec3> {
+        let power = |lamp: &&(DVec3, crate::Rgb)| lamp.1.element_sum();
+        let mut lamps: Vec<_> = self.map.lamps.iter().collect();
+        lamps.sort_by(|a, b| power(b).total_cmp(&power(a)));
+        let mut spots: Vec<DVec3> = Vec::new();
+        for (direction, _) in lamps {
+            if spots.len() < MOST_SPOTS && spots.iter().all(|s| s.dot(*direction) < SPOT.cos()) {
+                spots.push(*direction);
+            }
+        }
+        spots.into_iter().map(|direction| direction * FAR).collect()
     }
 
     /// Draws a unit direction from two numbers in `[0, 1)`; with its density in 1/sr.

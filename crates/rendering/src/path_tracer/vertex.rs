@@ -11,7 +11,7 @@ use crate::film::{to_local, to_world};
 
 /// Share of the spheres among the directions that leave a diffuse point.
 const SPHERES: f64 = 0.5;
-/// Share of the reflected point lights among the directions towards a sphere with a lobe.
+/// Share of the reflected lights among the directions towards a sphere with a lobe.
 const GLINTS: f64 = 0.5;
 
 /// The material of all subjects.
@@ -29,11 +29,12 @@ pub(super) struct Lobe {
     pub(super) alpha: f64,
 }
 
-/// Spheres and point lights: what directions are aimed at.
+/// Spheres, and lights that they reflect in narrow lobes: what directions are aimed at.
 #[derive(Clone, Copy)]
 pub(super) struct Targets<'a> {
     pub(super) spheres: &'a [(DVec3, f64)],
-    pub(super) lights: &'a [(DVec3, DVec3)],
+    /// Places of what is small and bright.
+    pub(super) lights: &'a [DVec3],
 }
 
 /// A point where light is scattered towards a viewer.
@@ -179,7 +180,7 @@ impl<'a> Vertex<'a> {
         let alpha = self.coat.lobe.map_or(0.0, |l| l.alpha);
         let share = if alpha > 0.0 && !self.targets.lights.is_empty() { GLINTS } else { 0.0 };
         let position = self.at.position;
-        (share, self.targets.lights.iter().map(move |l| Glint::new(position, sphere, l.0, alpha)))
+        (share, self.targets.lights.iter().map(move |l| Glint::new(position, sphere, *l, alpha)))
     }
 
     fn sample_spheres(&self, [u, v]: [f64; 2]) -> Option<DVec3> {
