@@ -5,13 +5,13 @@ use std::path::Path;
 
 use lookmatch_materials::Role;
 use lookmatch_search::{
-    Bounds, Exhaustive, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError,
-    by_name,
+    Bounds, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError, by_name,
 };
+use rayon::prelude::*;
 
 use crate::gallery::{Gallery, Match, Stopped};
 use crate::journal::Journal;
-use crate::table::FitnessTable;
+use crate::table::{BATCH, FitnessTable, Task};
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
 
 /// Levels by which a result may differ from what its neighbours foresaw.
@@ -25,11 +25,11 @@ pub enum Event {
         /// How many.
         done: usize,
     },
-    /// Before an exhaustive search: target points that were compared with all source points.
+    /// Before an exhaustive search: targets that were rendered, to be compared with all source points.
     Compared {
-        /// Compared points.
+        /// Rendered targets.
         done: usize,
-        /// All points of the target lattice.
+        /// All targets that look different.
         total: usize,
     },
     /// A source point is finished.
@@ -55,6 +55,19 @@ pub fn remap(
     observe: &mut dyn FnMut(Event),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Probe, RemapError> {
+    let certified = plan.search == "exhaustive";
+    run(plan, stage, state, certified, observe, stop)
+}
+
+/// [`remap()`]; `certified` finds optima through a [`FitnessTable`], where targets can be shared.
+fn run(
+    plan: &Plan,
+    stage: &Stage,
+    state: Option<&Path>,
+    certified: bool,
+    observe: &mut dyn FnMut(Event),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Probe, RemapError> {
     let lattice = Lattice { axes: plan.target_axes.clone() };
     let sources = Lattice { axes: plan.source_axes.clone() };
     let total = sources.len();
@@ -73,51 +86,92 @@ pub fn remap(
     }
     let pairing = Pairing::new(plan)?;
     let mut gallery = Gallery::new(plan, stage, &lattice);
-    let table = match plan.search.as_str() {
-        "exhaustive" if resumed < total => {
-            FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop)?
-        }
-        _ => None,
+    let table = if certified && resumed < total {
+        let table = FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop);
+        table.map_err(|e| interrupted(e, resumed, total))?
+    } else {
+        None
     };
     let mut done = resumed;
-    for (place, indices) in sources.points(&Bounds::full(&sources)).enumerate() {
-        if found[place].is_some() {
-            continue;
-        }
+    for wave in waves(plan, &sources, table.is_some()) {
         if stop() {
             return Err(RemapError::Interrupted { done, total });
         }
-        let values = sources.values(&indices);
-        let problem = match plan.strategy {
+        let wave: Vec<(usize, Point)> =
+            wave.into_iter().filter(|(place, _)| found[*place].is_none()).collect();
+        let values: Vec<Vec<f64>> = wave.iter().map(|(_, indices)| sources.values(indices)).collect();
+        let problem = |indices: &Point| match plan.strategy {
             Strategy::Unconstrained => pairing.alone(&lattice, plan.seed),
-            Strategy::Constrained => pairing.led(&lattice, plan.seed, &indices, &|p| {
+            Strategy::Constrained => pairing.led(&lattice, plan.seed, indices, &|p| {
                 found[place_of(&sources, p)].as_ref().map(|(point, _)| point)
             }),
         };
+        let problems: Vec<Problem> = wave.iter().map(|(_, indices)| problem(indices)).collect();
         let searched = match &table {
-            Some(table) => {
-                Exhaustive::default().run(&problem, &mut table.objective(place)).map_err(RemapError::Search)
-            }
-            None => search_one(plan, &mut gallery, &values, &problem, stop),
+            Some(table) => search_all(plan, table, &values, problems, stop),
+            None => (values.iter().zip(&problems))
+                .map(|(values, problem)| search_one(plan, &mut gallery, values, problem, stop))
+                .collect(),
         };
-        let outcome = match searched {
-            Err(RemapError::Search(SearchError::Objective(e))) if e.is::<Stopped>() => {
-                return Err(RemapError::Interrupted { done, total });
+        let outcomes: Vec<Outcome> = searched.map_err(|e| interrupted(e, done, total))?;
+        let entries = values.into_par_iter().zip(&outcomes);
+        let entries = entries.map(|(values, outcome)| entry(plan, stage, &lattice, values, outcome));
+        let entries: Vec<Entry> = entries.collect::<Result<_, _>>()?;
+        for (((place, _), outcome), entry) in wave.into_iter().zip(outcomes).zip(entries) {
+            if let Some(journal) = &mut journal {
+                journal.append(place, &outcome.best, &entry)?;
             }
-            other => other?,
-        };
-        let entry = entry(plan, stage, &lattice, values, &outcome)?;
-        if let Some(journal) = &mut journal {
-            journal.append(place, &outcome.best, &entry)?;
+            found[place] = Some((outcome.best, entry));
+            done += 1;
+            observe(Event::Point { done, total });
         }
-        found[place] = Some((outcome.best, entry));
-        done += 1;
-        observe(Event::Point { done, total });
     }
     if let Some(journal) = journal {
         journal.remove();
     }
     Ok(Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len()))
+}
+
+/// An error of a search, with what was done where it was stopped from outside.
+fn interrupted(error: RemapError, done: usize, total: usize) -> RemapError {
+    match error {
+        RemapError::Search(SearchError::Objective(e)) if e.is::<Stopped>() => {
+            RemapError::Interrupted { done, total }
+        }
+        other => other,
+    }
+}
+
+/// Source points in groups that can be searched together, with their places; each only needs the results of earlier
+/// groups.
+fn waves(plan: &Plan, sources: &Lattice, together: bool) -> Vec<Vec<(usize, Point)>> {
+    let mut points: Vec<(usize, Point)> = sources.points(&Bounds::full(sources)).enumerate().collect();
+    // Neighbours that lead a point have a smaller sum of indices.
+    let rank = |(_, point): &(usize, Point)| match plan.strategy {
+        Strategy::Constrained => point.iter().sum::<u32>(),
+        Strategy::Unconstrained => 0,
+    };
+    if !together {
+        return points.into_iter().map(|point| vec![point]).collect();
+    }
+    points.sort_by_key(rank);
+    let groups = points.chunk_by(|a, b| rank(a) == rank(b));
+    groups.flat_map(|group| group.chunks(BATCH)).map(<[_]>::to_vec).collect()
+}
+
+/// Searches the targets of several source points that do not depend on each other.
+fn search_all(
+    plan: &Plan,
+    table: &FitnessTable,
+    values: &[Vec<f64>],
+    problems: Vec<Problem>,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<Outcome>, RemapError> {
+    let task = |(values, problem): (&Vec<f64>, Problem)| {
+        Ok(Task { source: plan.source_material(values)?, bounds: problem.bounds })
+    };
+    let tasks = values.iter().zip(problems).map(task).collect::<Result<Vec<_>, RemapError>>()?;
+    table.search(&tasks, stop)
 }
 
 /// Searches the target of one source point.
