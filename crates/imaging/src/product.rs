@@ -9,9 +9,9 @@ const LANES: usize = 16;
 /// Rows that pass a panel together: with 16 columns, as many sums as fit the registers of AVX2.
 const ROWS: usize = 6;
 /// Products added in `f32` before their sum moves to `f64`.
-const SPAN: usize = 32;
+const SPAN: usize = 16;
 /// Squared distances below this part of `|a|² + |b|²` are summed directly: see [`Columns::squared_distances`].
-const NEAR: f64 = 1.0 / 32.0;
+const NEAR: f64 = 1.0 / 8.0;
 
 /// Vectors of one length, packed to be multiplied with many others.
 #[derive(Clone, Debug)]
@@ -51,8 +51,11 @@ impl Columns {
         self.count == 0
     }
 
-    /// Most by which a product may be off, over the product of both lengths `|a| |b|`: 33 roundings of `f32`.
+    /// Most by which a product may be off, over the product of both lengths `|a| |b|`: 17 roundings of `f32`.
     pub const PRODUCT_ERROR: f64 = (SPAN + 1) as f64 / (1u64 << 24) as f64;
+
+    /// Most by which a squared distance may be off, over its value.
+    pub const DISTANCE_ERROR: f64 = 1e-5;
 
     /// Inner products of rows with all columns, row after row, within [`Columns::PRODUCT_ERROR`].
     ///
@@ -79,10 +82,10 @@ impl Columns {
         products
     }
 
-    /// Squared distances of rows to all columns, row after row, within 1e-4 of their value.
+    /// Squared distances of rows to all columns, row after row, within [`Columns::DISTANCE_ERROR`] of their value.
     ///
     /// `|a|² + |b|² − 2 a·b` loses as many digits as the distance is smaller than the vectors. The error is at most
-    /// [`Columns::PRODUCT_ERROR`] (2e-6) of `|a|² + |b|²`; pairs whose squared distance is less than 1/32 of that are
+    /// [`Columns::PRODUCT_ERROR`] (1e-6) of `|a|² + |b|²`; pairs whose squared distance is less than 1/8 of that are
     /// therefore summed directly.
     ///
     /// # Panics
@@ -91,10 +94,21 @@ impl Columns {
         let mut distances = self.products(rows);
         for (row, out) in rows.iter().zip(distances.chunks_mut(self.count.max(1))) {
             let square = inner_product(row, row);
-            for (k, out) in out.iter_mut().enumerate() {
-                let scale = square + self.squares[k];
-                let distance = scale - 2.0 * *out;
-                *out = if distance >= NEAR * scale { distance } else { self.direct(row, k) };
+            let groups = out.chunks_mut(LANES).zip(self.squares.chunks(LANES)).enumerate();
+            for (group, (out, squares)) in groups {
+                let mut any_near = false;
+                let near: [bool; LANES] = std::array::from_fn(|l| {
+                    let (Some(out), Some(column)) = (out.get_mut(l), squares.get(l)) else { return false };
+                    let scale = square + column;
+                    *out = scale - 2.0 * *out;
+                    any_near |= *out < NEAR * scale;
+                    *out < NEAR * scale
+                });
+                if any_near {
+                    let direct = direct_dispatched(row, self.panel(group));
+                    let near = out.iter_mut().zip(direct).zip(near).filter(|(_, near)| *near);
+                    near.for_each(|((out, direct), _)| *out = direct);
+                }
             }
         }
         distances
@@ -102,11 +116,6 @@ impl Columns {
 
     fn panel(&self, group: usize) -> &[[f32; LANES]] {
         &self.values[group * self.length..][..self.length]
-    }
-
-    fn direct(&self, row: &[f32], k: usize) -> f64 {
-        let column = self.panel(k / LANES).iter().map(|lanes| f64::from(lanes[k % LANES]));
-        column.zip(row).map(|(b, a)| (f64::from(*a) - b) * (f64::from(*a) - b)).sum()
     }
 }
 
@@ -122,6 +131,11 @@ pub fn inner_product(a: &[f32], b: &[f32]) -> f64 {
 #[multiversion(targets = "simd")]
 fn tile_dispatched(rows: &[&[f32]; ROWS], panel: &[[f32; LANES]], sums: &mut [[f64; LANES]; ROWS]) {
     tile(rows, panel, sums);
+}
+
+#[multiversion(targets = "simd")]
+fn direct_dispatched(row: &[f32], panel: &[[f32; LANES]]) -> [f64; LANES] {
+    direct(row, panel)
 }
 
 #[multiversion(targets = "simd")]
@@ -148,6 +162,19 @@ fn tile(rows: &[&[f32]; ROWS], panel: &[[f32; LANES]], sums: &mut [[f64; LANES];
             }
         }
     }
+}
+
+/// Squared distances of a row to the columns of a panel.
+#[inline(always)]
+fn direct(row: &[f32], panel: &[[f32; LANES]]) -> [f64; LANES] {
+    let mut sums = [0.0; LANES];
+    for (value, lanes) in row.iter().zip(panel) {
+        for l in 0..LANES {
+            let d = f64::from(*value) - f64::from(lanes[l]);
+            sums[l] += d * d;
+        }
+    }
+    sums
 }
 
 #[inline(always)]

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use lookmatch_imaging::{Columns, inner_product};
+use lookmatch_imaging::{Columns, inner_product, weighted_squared_distance};
 use rayon::prelude::*;
 
 /// Pixels that are multiplied with the basis together: their part of it fits the first cache.
@@ -19,15 +19,23 @@ const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 
 /// Maps three planes of an image, weighted per pixel, to coordinates.
 pub(crate) struct Projection {
-    pixels: usize,
-    /// Directions of the coordinates with the pixels' weights, block by block of the pixels of all three planes.
-    blocks: Vec<Columns>,
+    blocks: Vec<Block>,
     /// Largest factor by which the map lengthens a vector: 1 but for rounding.
     stretch: f64,
 }
 
-/// Writes the three planes of a range of pixels of an image, and returns the square of their weighted length.
-type Planes<'a> = dyn Fn(usize, Range<usize>, &mut [f32]) -> f64 + Sync + 'a;
+/// What some pixels add to the coordinates; all planes one after the other.
+struct Block {
+    pixels: Range<usize>,
+    weights: Vec<f32>,
+    /// The mean of the samples, which is subtracted first: what is short has little rounding.
+    middle: Vec<f32>,
+    /// Directions of the coordinates, weighted.
+    directions: Columns,
+}
+
+/// Writes the three planes of a range of pixels of an image.
+type Planes<'a> = dyn Fn(usize, Range<usize>, &mut [f32]) + Sync + 'a;
 
 /// The coordinates of some images.
 #[derive(Clone, Debug, Default)]
@@ -56,44 +64,47 @@ impl Projection {
     /// little as [`COORDINATES`] directions can.
     pub(crate) fn fit(samples: &[&[f32]], weights: Option<&[f32]>, tolerance: f64) -> Self {
         let pixels = samples[0].len() / 3;
-        let weight = |i: usize| weights.map_or(1.0, |w| w[i % pixels]);
-        let weighted =
-            |s: &&[f32]| -> Vec<f32> { s.iter().enumerate().map(|(i, v)| v * weight(i)).collect() };
-        let weighted: Vec<Vec<f32>> = samples.par_iter().map(weighted).collect();
-        let basis = basis(&weighted, tolerance);
-        let pack = |block: Range<usize>| {
-            let part = |direction: &Vec<f32>| -> Vec<f32> {
-                let planes = direction.chunks_exact(pixels);
-                planes.flat_map(|p| block.clone().map(|i| p[i] * weight(i))).collect()
-            };
-            Columns::new(3 * block.len(), &basis.iter().map(part).collect::<Vec<_>>())
+        let weights = weights.map_or_else(|| vec![1.0; pixels], <[f32]>::to_vec);
+        let middle = mean(samples);
+        let centred = |sample: &&[f32]| -> Vec<f32> {
+            let weights = weights.iter().cycle();
+            sample.iter().zip(&middle).zip(weights).map(|((v, m), w)| (v - m) * w).collect()
         };
-        let blocks = blocks(pixels).into_par_iter().map(pack).collect();
-        // The norm of a symmetric matrix is at most its largest sum of magnitudes along a row (Gershgorin).
-        let row = |i: usize| basis.iter().map(|b| inner_product(&basis[i], b).abs()).sum::<f64>();
-        let norm = (0..basis.len()).into_par_iter().map(row).reduce(|| 0.0, f64::max);
-        // Weighting rounds every value of every direction once more.
-        let rounding = ROUNDING * (basis.len() as f64).sqrt();
-        Self { pixels, blocks, stretch: norm.sqrt().max(1.0) + rounding }
+        let centred: Vec<Vec<f32>> = samples.par_iter().map(centred).collect();
+        let basis = basis(&centred, tolerance);
+        let block = |first: usize| {
+            let pixels = first..(first + BLOCK).min(weights.len());
+            let planes = |whole: &[f32]| {
+                whole.chunks_exact(weights.len()).flat_map(|p| p[pixels.clone()].to_vec()).collect()
+            };
+            let weights = weights[pixels.clone()].to_vec();
+            let weighted = |direction: &Vec<f32>| -> Vec<f32> {
+                let part: Vec<f32> = planes(direction);
+                part.iter().zip(weights.iter().cycle()).map(|(v, w)| v * w).collect()
+            };
+            let directions: Vec<Vec<f32>> = basis.iter().map(weighted).collect();
+            let directions = Columns::new(3 * pixels.len(), &directions);
+            Block { middle: planes(&middle), weights, directions, pixels: pixels.clone() }
+        };
+        let blocks = (0..pixels).into_par_iter().step_by(BLOCK).map(block).collect();
+        Self { blocks, stretch: stretch(&basis) }
     }
 
     /// Number of coordinates.
     pub(crate) fn len(&self) -> usize {
-        self.blocks[0].len()
+        self.blocks[0].directions.len()
     }
 
     /// Projects `count` images.
     pub(crate) fn project(&self, count: usize, planes: &Planes) -> Sketches {
-        let parts: Vec<(Vec<f64>, Vec<f64>)> = (blocks(self.pixels).par_chunks(RUN))
-            .zip(self.blocks.par_chunks(RUN))
-            .map(|(ranges, blocks)| self.project_run(count, planes, ranges, blocks))
-            .collect();
+        let run = |blocks: &[Block]| self.project_run(count, planes, blocks);
+        let parts: Vec<(Vec<f64>, Vec<f64>)> = self.blocks.par_chunks(RUN).map(run).collect();
         let (mut sums, mut squares) = (vec![0.0; count * self.len()], vec![0.0; count]);
         for (products, lengths) in parts {
             add(&mut sums, &products);
             add(&mut squares, &lengths);
         }
-        // Each coordinate is off by the error of a product and by the rounding of a value, weighted before, and of a sum.
+        // Each coordinate is off by the error of a product, and by the rounding of a difference and of a sum.
         let unit = (Columns::PRODUCT_ERROR + 2.0 * ROUNDING) * (self.len() as f64).sqrt();
         Sketches {
             coordinates: sums.into_iter().map(|c| c as f32).collect(),
@@ -101,30 +112,27 @@ impl Projection {
         }
     }
 
-    fn project_run(
-        &self,
-        count: usize,
-        planes: &Planes,
-        ranges: &[Range<usize>],
-        blocks: &[Columns],
-    ) -> (Vec<f64>, Vec<f64>) {
+    /// The sums of some blocks, and the squared lengths of what was projected.
+    fn project_run(&self, count: usize, planes: &Planes, blocks: &[Block]) -> (Vec<f64>, Vec<f64>) {
         let (mut sums, mut squares) = (vec![0.0; count * self.len()], vec![0.0; count]);
         let mut buffer = vec![0.0; count * 3 * BLOCK];
-        for (range, block) in ranges.iter().zip(blocks) {
-            let buffer = &mut buffer[..count * 3 * range.len()];
-            for (image, planes_out) in buffer.chunks_exact_mut(3 * range.len()).enumerate() {
-                squares[image] += planes(image, range.clone(), planes_out);
+        for Block { pixels, weights, middle, directions } in blocks {
+            let buffer = &mut buffer[..count * middle.len()];
+            for (image, part) in buffer.chunks_exact_mut(middle.len()).enumerate() {
+                planes(image, pixels.clone(), part);
+                squares[image] += weighted_squared_distance(part, middle, weights);
+                part.iter_mut().zip(middle).for_each(|(v, m)| *v -= m);
             }
-            let rows: Vec<&[f32]> = buffer.chunks_exact(3 * range.len()).collect();
-            add(&mut sums, &block.products(&rows));
+            let rows: Vec<&[f32]> = buffer.chunks_exact(middle.len()).collect();
+            add(&mut sums, &directions.products(&rows));
         }
         (sums, squares)
     }
 
     /// A lower bound of the distance of two images, given the squared distance of their coordinates, before slack.
     pub(crate) fn least_distance(&self, squared: f64) -> f64 {
-        // `Columns::squared_distances` is exact to 1e-4.
-        squared.sqrt() * (1.0 - 1e-4) / self.stretch
+        // The root halves the error of the square; the other half is more than the rounding of a fitness.
+        squared.sqrt() * (1.0 - Columns::DISTANCE_ERROR) / self.stretch
     }
 }
 
@@ -132,8 +140,19 @@ fn add(sums: &mut [f64], values: &[f64]) {
     sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += v);
 }
 
-fn blocks(pixels: usize) -> Vec<Range<usize>> {
-    (0..pixels).step_by(BLOCK).map(|first| first..(first + BLOCK).min(pixels)).collect()
+fn mean(samples: &[&[f32]]) -> Vec<f32> {
+    let mut sums = vec![0.0; samples[0].len()];
+    samples.iter().for_each(|sample| sums.iter_mut().zip(*sample).for_each(|(sum, v)| *sum += f64::from(*v)));
+    sums.iter().map(|sum| (sum / samples.len() as f64) as f32).collect()
+}
+
+/// Most by which the products with some directions, times weights, lengthen a vector.
+fn stretch(basis: &[Vec<f32>]) -> f64 {
+    // The norm of a symmetric matrix is at most its largest sum of magnitudes along a row (Gershgorin).
+    let row = |i: usize| basis.iter().map(|b| inner_product(&basis[i], b).abs()).sum::<f64>();
+    let norm = (0..basis.len()).into_par_iter().map(row).reduce(|| 0.0, f64::max);
+    // Weighting rounds every value of every direction once more.
+    norm.sqrt().max(1.0) + ROUNDING * (basis.len() as f64).sqrt()
 }
 
 /// Orthonormal directions such that no sample keeps more than `tolerance` of its length beside them: samples
@@ -204,4 +223,57 @@ fn pivots(gram: &[Vec<f64>], tolerance: f64) -> (Vec<usize>, Vec<Vec<f64>>) {
     }
     let factor = chosen.iter().map(|i| rows[*i].clone()).collect();
     (chosen, factor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pictures that are smooth in two parameters, with some grain of their own.
+    fn picture(pixels: usize, k: usize, grain: f32) -> Vec<f32> {
+        let (a, b) = ((k as f32 * 0.618).fract(), (k as f32 * 0.414).fract());
+        let value = |i: usize| {
+            let x = i as f32 / pixels as f32;
+            let noise = ((i * 7919 + k * 104_729) % 1009) as f32 / 1009.0;
+            100.0 * a * (-(x - b).powi(2) / (0.02 + 0.1 * a)).exp() + grain * noise
+        };
+        (0..3 * pixels).map(value).collect()
+    }
+
+    #[test]
+    fn projected_distances_are_lower_bounds_and_close() {
+        for (pixels, grain) in [(7, 0.1), (1000, 0.0), (2000, 0.1), (700, 5.0)] {
+            let weights: Vec<f32> = (0..pixels).map(|i| (i % 10) as f32 / 9.0).collect();
+            let samples: Vec<Vec<f32>> = (0..50).map(|k| picture(pixels, k, grain)).collect();
+            let slices: Vec<&[f32]> = samples.iter().map(Vec::as_slice).collect();
+            let projection = Projection::fit(&slices, Some(&weights), 0.1);
+            let pictures: Vec<Vec<f32>> = (0..40).map(|k| picture(pixels, 30 + k, grain)).collect();
+            let copy = |image: usize, range: Range<usize>, out: &mut [f32]| {
+                let planes = pictures[image].chunks_exact(pixels).zip(out.chunks_exact_mut(range.len()));
+                planes.for_each(|(plane, out)| out.copy_from_slice(&plane[range.clone()]));
+            };
+            let sketches = projection.project(pictures.len(), &copy);
+            let rows = sketches.rows(projection.len());
+            let squared = Columns::new(projection.len(), &rows).squared_distances(&rows);
+            for (pair, squared) in squared.into_iter().enumerate() {
+                let (i, k) = (pair / pictures.len(), pair % pictures.len());
+                let exact = weighted_squared_distance(&pictures[i], &pictures[k], &weights).sqrt();
+                let least = projection.least_distance(squared) - sketches.slack[i] - sketches.slack[k];
+                assert!(least <= exact, "{least} {exact}");
+                let close = 0.9 * exact - 0.1 - 2.0 * f64::from(grain) * (pixels as f64).sqrt();
+                assert!(least >= close, "{least} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn equal_samples_make_a_sound_projection() {
+        let samples = [[0.0f32; 30]; 3];
+        let projection = Projection::fit(&samples.each_ref().map(|s| s.as_slice()), None, 0.0);
+        let sketches = projection.project(1, &|_, range, out| {
+            assert_eq!(range, 0..10);
+            out.fill(1.0);
+        });
+        assert!(sketches.coordinates.iter().all(|v| v.is_finite()) && sketches.slack[0].is_finite());
+    }
 }

@@ -1,7 +1,6 @@
 //! The reference scene under its two lights, materials as seen in it, and the distance between two of them.
 
 use std::collections::HashMap;
-use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lookmatch_imaging::{Fitness, Reduce, Space, lab_planes, squared_distance, weighted_squared_distance};
@@ -128,8 +127,7 @@ impl Stage {
         let sketch = |renderer: &Renderer, projection: &Projection| {
             let images = renderer.specular_batch(&bsdfs);
             projection.project(images.len(), &|image, pixels, planes| {
-                lab_planes(&images[image][pixels.clone()], planes);
-                self.squared_length(planes, pixels)
+                lab_planes(&images[image][pixels], planes);
             })
         };
         [sketch(&self.point, point), sketch(&self.environment, environment)]
@@ -146,19 +144,9 @@ impl Stage {
                 let wholes = whole(&seen[image]).chunks_exact(self.point.subjects().len());
                 let parts = planes.chunks_exact_mut(pixels.len()).zip(wholes);
                 parts.for_each(|(part, whole)| part.copy_from_slice(&whole[pixels.clone()]));
-                self.squared_length(planes, pixels)
             })
         };
         [sketch(|s| &s.point, point), sketch(|s| &s.environment, environment)]
-    }
-
-    /// Square of the weighted length of three planes of some pixels.
-    fn squared_length(&self, planes: &[f32], pixels: Range<usize>) -> f64 {
-        let zero = vec![0.0; planes.len()];
-        match &self.weights {
-            Some(weights) => weighted_squared_distance(planes, &zero, &weights[pixels]),
-            None => squared_distance(planes, &zero),
-        }
     }
 
     /// NRMSD per channel of the full pictures under the environment, whole image: without and with the mask.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::gallery::{Gallery, Match, Stopped};
 use crate::journal::Journal;
-use crate::table::{BATCH, FitnessTable, Task};
+use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
 
 /// Levels by which a result may differ from what its neighbours foresaw.
@@ -38,6 +38,8 @@ pub enum Event {
         done: usize,
         /// All points.
         total: usize,
+        /// Targets that were compared with it in full.
+        compared: usize,
     },
 }
 
@@ -111,19 +113,20 @@ fn run(
             Some(table) => search_all(plan, table, &values, problems, stop),
             None => (values.iter().zip(&problems))
                 .map(|(values, problem)| search_one(plan, &mut gallery, values, problem, stop))
+                .map(|outcome| outcome.map(|outcome| Found { compared: outcome.evaluations, outcome }))
                 .collect(),
         };
-        let outcomes: Vec<Outcome> = searched.map_err(|e| interrupted(e, done, total))?;
-        let entries = values.into_par_iter().zip(&outcomes);
-        let entries = entries.map(|(values, outcome)| entry(plan, stage, &lattice, values, outcome));
+        let results: Vec<Found> = searched.map_err(|e| interrupted(e, done, total))?;
+        let entries = values.into_par_iter().zip(&results);
+        let entries = entries.map(|(values, found)| entry(plan, stage, &lattice, values, &found.outcome));
         let entries: Vec<Entry> = entries.collect::<Result<_, _>>()?;
-        for (((place, _), outcome), entry) in wave.into_iter().zip(outcomes).zip(entries) {
+        for (((place, _), Found { outcome, compared }), entry) in wave.into_iter().zip(results).zip(entries) {
             if let Some(journal) = &mut journal {
                 journal.append(place, &outcome.best, &entry)?;
             }
             found[place] = Some((outcome.best, entry));
             done += 1;
-            observe(Event::Point { done, total });
+            observe(Event::Point { done, total, compared });
         }
     }
     if let Some(journal) = journal {
@@ -166,7 +169,7 @@ fn search_all(
     values: &[Vec<f64>],
     problems: Vec<Problem>,
     stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<Outcome>, RemapError> {
+) -> Result<Vec<Found>, RemapError> {
     let task = |(values, problem): (&Vec<f64>, Problem)| {
         Ok(Task { source: plan.source_material(values)?, bounds: problem.bounds })
     };
@@ -343,4 +346,95 @@ fn guesses<'f>(
 /// `a + b − c`, no index below 0.
 fn combine(a: &Point, b: &Point, c: &Point) -> Point {
     a.iter().zip(b).zip(c).map(|((a, b), c)| (a + b).saturating_sub(*c)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Assignment, Options, Preset, Side, Vary};
+    use lookmatch_materials::Levels;
+
+    fn vary(side: Side, name: &str, (min, max, step): (f64, f64, f64)) -> Vary {
+        Vary { side: Some(side), name: name.into(), levels: Levels::new(min, max, step) }
+    }
+
+    /// Ward to GGX with 5 × 4 source points, dark ones among them, and 2 × 13 × 18 targets.
+    fn options(strategy: Strategy, mask: bool) -> Options {
+        Options {
+            strategy,
+            search: "exhaustive".into(),
+            mask,
+            preset: Some(Preset::Paper),
+            size: Some(40),
+            vary: vec![
+                vary(Side::Source, "specular", (0.0, 0.2, 0.05)),
+                vary(Side::Source, "roughness", (0.03, 0.63, 0.2)),
+                vary(Side::Target, "ior", (1.1, 2.3, 0.1)),
+                vary(Side::Target, "roughness", (0.02, 0.70, 0.04)),
+            ],
+            ..Options::default()
+        }
+    }
+
+    fn plan(from: &str, options: &Options) -> Plan {
+        let model = |name| lookmatch_materials::by_name(name).unwrap();
+        Plan::new(model(from), model("ggx"), options).unwrap()
+    }
+
+    /// Entries, and the targets that were compared in full.
+    fn entries(plan: &Plan, stage: &Stage, certified: bool) -> (Vec<Entry>, usize) {
+        let mut sum = 0;
+        let mut observe = |event: Event| {
+            if let Event::Point { compared, .. } = event {
+                sum += compared;
+            }
+        };
+        let probe = run(plan, stage, None, certified, &mut observe, &|| false).unwrap();
+        (probe.entries, sum)
+    }
+
+    #[test]
+    fn certified_optima_are_those_of_brute_force_on_any_number_of_threads() {
+        for mask in [false, true] {
+            let stage = Stage::prepare(&plan("ward", &options(Strategy::Constrained, mask))).unwrap();
+            for strategy in [Strategy::Constrained, Strategy::Unconstrained] {
+                let plan = plan("ward", &options(strategy, mask));
+                let (brute, all) = entries(&plan, &stage, false);
+                for threads in [1, 3] {
+                    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                    let (certified, compared) = pool.install(|| entries(&plan, &stage, true));
+                    assert_eq!(certified, brute);
+                    assert!(compared < all / 20, "{compared} of {all} compared in full");
+                }
+            }
+        }
+    }
+
+    /// A conductor has no diffuse reflectance to hand over: the target keeps its own.
+    #[test]
+    fn certified_optima_with_a_diffuse_term() {
+        let mut options = options(Strategy::Unconstrained, false);
+        options.vary.retain(|v| v.side == Some(Side::Target));
+        let plan = plan("beckmann-conductor", &options);
+        let stage = Stage::prepare(&plan).unwrap();
+        assert_eq!(entries(&plan, &stage, true).0, entries(&plan, &stage, false).0);
+    }
+
+    #[test]
+    fn the_first_of_all_ties_wins() {
+        let dark = Assignment { side: Some(Side::Target), name: "specular".into(), value: "0".into() };
+        let plan = plan("ward", &Options { fix: vec![dark], ..options(Strategy::Constrained, false) });
+        let stage = Stage::prepare(&plan).unwrap();
+        let (certified, _) = entries(&plan, &stage, true);
+        assert_eq!(certified, entries(&plan, &stage, false).0);
+        assert_eq!(certified[0].target, [1.1, 0.02]);
+    }
+
+    #[test]
+    fn a_stopped_table_says_so() {
+        let plan = plan("ward", &options(Strategy::Unconstrained, false));
+        let stage = Stage::prepare(&plan).unwrap();
+        let error = remap(&plan, &stage, None, &mut |_| {}, &|| true).unwrap_err();
+        assert!(matches!(error, RemapError::Interrupted { done: 0, total: 20 }), "{error}");
+    }
 }

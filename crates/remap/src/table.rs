@@ -47,6 +47,13 @@ pub(crate) struct Task {
     pub(crate) bounds: Bounds,
 }
 
+/// The match of a source.
+pub(crate) struct Found {
+    pub(crate) outcome: Outcome,
+    /// Targets that were compared in full.
+    pub(crate) compared: usize,
+}
+
 /// A source on its way to its match.
 struct Pursuit<'t> {
     task: &'t Task,
@@ -102,7 +109,7 @@ impl<'a> FitnessTable<'a> {
         &self,
         tasks: &[Task],
         stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Vec<Outcome>, RemapError> {
+    ) -> Result<Vec<Found>, RemapError> {
         let mut pursuits = self.pursuits(tasks)?;
         // At first the most promising target of each source; then there is a fitness to beat.
         for _ in 0..2 {
@@ -119,7 +126,7 @@ impl<'a> FitnessTable<'a> {
                 self.compare(batch, &mut pursuits)?;
             }
         }
-        pursuits.iter().map(|pursuit| self.outcome(pursuit)).collect()
+        pursuits.iter().map(|pursuit| self.found(pursuit)).collect()
     }
 
     /// Renders the sources, and bounds their fitness to every target from below.
@@ -177,7 +184,7 @@ impl<'a> FitnessTable<'a> {
         Ok(())
     }
 
-    fn outcome(&self, pursuit: &Pursuit) -> Result<Outcome, RemapError> {
+    fn found(&self, pursuit: &Pursuit) -> Result<Found, RemapError> {
         let (fitness, place) = pursuit.best().ok_or(RemapError::Search(SearchError::NothingEvaluated))?;
         let best = point(self.lattice, place);
         if !fitness.is_finite() {
@@ -185,7 +192,9 @@ impl<'a> FitnessTable<'a> {
             return Err(RemapError::Search(SearchError::NotFinite { fitness, parameters, point: best }));
         }
         // Every target within bounds was considered.
-        Ok(Outcome { best, fitness: fitness + 0.0, evaluations: pursuit.places.len(), generations: 0 })
+        let evaluations = pursuit.places.len();
+        let outcome = Outcome { best, fitness: fitness + 0.0, evaluations, generations: 0 };
+        Ok(Found { outcome, compared: pursuit.compared.len() })
     }
 }
 
