@@ -1,16 +1,16 @@
 //! What a proven optimum costs, and how that grows with the lattices.
 //!
-//! `cargo bench -p lookmatch-remap --bench exhaustive [SIZE]` prints, for lattices 1/4, 1/2, 1 and 2 times as fine, the
-//! processor time of each target and of each source, the latter in units of the former's growth as well, how many
-//! targets had to be compared in full with a source, and the most memory used so far.
+//! `cargo bench -p lookmatch-remap --bench exhaustive [-- SIZE]` prints, for lattices with 1/4, 1/2, 1 and 2 times the points:
+//! the processor time of each target and of each source, and its ratio to that of the lattice before; how many targets
+//! had to be compared in full with a source (median, 90th percentile, maximum, mean); the most memory used so far.
 
 use lookmatch_materials::{Levels, by_name};
 use lookmatch_remap::{Event, Options, Plan, Preset, Side, Stage, Strategy, Vary, remap};
 
-/// Numbers of levels at the finest: those of the paper are half of them along one axis.
+/// Numbers of points in units of the paper's.
 const FINENESS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 
-/// Ward to GGX, each lattice with a number of points that is a multiple of the paper's 20 × 35 and 85 × 70.
+/// Ward to GGX on lattices with about `fineness` times the paper's 20 × 35 and 2 × 85 × 70 points.
 fn plan(fineness: f64, size: usize) -> Plan {
     let vary = |side, name: &str, min: f64, max: f64, levels: f64| {
         let step = (max - min) / ((levels * fineness.sqrt()).round() - 1.0);
@@ -20,7 +20,6 @@ fn plan(fineness: f64, size: usize) -> Plan {
         strategy: Strategy::Unconstrained,
         search: "exhaustive".into(),
         preset: Some(Preset::Paper),
-        mask: true,
         size: Some(size),
         vary: vec![
             vary(Side::Source, "specular", 0.02, 0.40, 20.0),
@@ -53,16 +52,8 @@ fn main() {
     let stage = Stage::prepare(&plan(1.0, size)).expect("the reference scene");
     println!("scene prepared: {:.1} CPU s, {:.0} MiB", processor_seconds(), peak_memory());
     println!(
-        "{:>8}{:>9}{:>9}{:>12}{:>8}{:>12}{:>8}{:>26}{:>10}",
-        "fineness",
-        "targets",
-        "sources",
-        "ms/target",
-        "ratio",
-        "ms/source",
-        "ratio",
-        "compared: 50 %, 90 %, all",
-        "MiB"
+        "{:>8}{:>9}{:>9}{:>12}{:>8}{:>12}{:>8}{:>20}{:>8}",
+        "fineness", "targets", "sources", "ms/target", "ratio", "ms/source", "ratio", "compared", "MiB"
     );
     let mut last: Option<[f64; 2]> = None;
     for fineness in FINENESS {
@@ -83,13 +74,14 @@ fn main() {
             last.map_or([1.0; 2], |last| [costs[0] / last[0], costs[1] / last[1]]);
         last = Some(costs);
         counts.sort_unstable();
+        let mean = counts.iter().sum::<usize>() as f64 / counts.len() as f64;
         let part = |share: f64| counts[((counts.len() - 1) as f64 * share).round() as usize];
         println!(
-            "{fineness:>8}{targets:>9}{:>9}{:>12.3}{target_ratio:>8.2}{:>12.3}{source_ratio:>8.2}{:>26}{:>10.0}",
+            "{fineness:>8}{targets:>9}{:>9}{:>12.3}{target_ratio:>8.2}{:>12.3}{source_ratio:>8.2}{:>20}{:>8.0}",
             counts.len(),
             costs[0],
             costs[1],
-            format!("{}, {}, {}", part(0.5), part(0.9), part(1.0)),
+            format!("{}, {}, {}, {mean:.2}", part(0.5), part(0.9), part(1.0)),
             peak_memory(),
         );
     }

@@ -22,8 +22,9 @@ pub(crate) const BATCH: usize = 60;
 const ROWS: usize = 6;
 /// Sources and targets each that the projections are made from.
 const SAMPLES: usize = 80;
-/// Fitness that a projection may leave out of a sample.
-const TOLERANCE: f64 = 0.01;
+/// Fitness that a projection may leave out of a sample: far less than the best matches have, so that few others seem as
+/// good.
+const TOLERANCE: f64 = 0.002;
 
 /// All targets of a plan, to be compared with sources.
 pub(crate) struct FitnessTable<'a> {
