@@ -1,7 +1,7 @@
 //! What a comparison of two materials costs (four pairs of 300 x 300 images), beside copying the same bytes.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use lookmatch_imaging::{Image, lab_planes, squared_distance};
+use lookmatch_imaging::{Columns, Image, lab_planes, squared_distance};
 use std::hint::black_box;
 
 const SIZE: usize = 300;
@@ -44,5 +44,17 @@ fn metric(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, metric);
+/// 128 pixels of 64 images: a block of what an exhaustive search projects.
+fn products(criterion: &mut Criterion) {
+    const LENGTH: usize = 3 * 128;
+    let vector = |k: usize| -> Vec<f32> { (0..LENGTH).map(|i| ((i * 7 + k * 31) % 257) as f32).collect() };
+    let columns = Columns::new(LENGTH, &(0..48).map(vector).collect::<Vec<_>>());
+    let rows: Vec<Vec<f32>> = (0..64).map(|k| vector(k + 50)).collect();
+    let rows: Vec<&[f32]> = rows.iter().map(Vec::as_slice).collect();
+    criterion.bench_function("products of 64 rows of 384 values with 48 columns", |bencher| {
+        bencher.iter(|| black_box(columns.products(black_box(&rows))));
+    });
+}
+
+criterion_group!(benches, metric, products);
 criterion_main!(benches);

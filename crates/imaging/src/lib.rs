@@ -12,6 +12,7 @@ mod file;
 mod image;
 mod lab;
 mod metrics;
+mod product;
 
 pub use atomic::write_atomically;
 pub use colour::{delta_e76, lab_from_linear_srgb, luminance, srgb_decode, srgb_encode};
@@ -23,3 +24,4 @@ pub use lab::{lab_planes, squared_distance, weighted_squared_distance};
 pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
 pub use metrics::mask::{Mask, disc_weight};
 pub use metrics::nrmsd::{nrmsd, nrmsd_pixels};
+pub use product::{Columns, inner_product};

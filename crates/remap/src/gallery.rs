@@ -15,9 +15,9 @@ use crate::{Plan, RemapError};
 const CAPACITY: usize = 500 << 20;
 
 /// What a specular appearance depends on: the bits of every value but the diffuse reflectance; empty without a lobe.
-type Key = Vec<u64>;
+pub(crate) type Key = Vec<u64>;
 
-fn key(material: &Material) -> Key {
+pub(crate) fn key(material: &Material) -> Key {
     if material.bsdf().sampling().is_none() {
         return Key::new();
     }

@@ -12,6 +12,7 @@ mod gallery;
 mod journal;
 mod plan;
 mod probe;
+mod projection;
 mod stage;
 mod strategy;
 mod table;

@@ -8,6 +8,7 @@ use lookmatch_materials::{Bsdf, Material};
 use lookmatch_rendering::{Illumination, Part, Renderer};
 use rayon::prelude::*;
 
+use crate::projection::{Projection, Sketches};
 use crate::{Plan, RemapError};
 
 /// What the metric knows of a material: the specular images under both lights in CIELAB, on the subject's pixels only.
@@ -82,13 +83,70 @@ impl Stage {
             * (w.specular_point * self.rms(&seen_a.point, &seen_b.point)
                 + w.specular_environment * self.rms(&seen_a.environment, &seen_b.environment));
         let (albedo_a, albedo_b) = (a.bsdf().diffuse(), b.bsdf().diffuse());
+        if albedo_a == albedo_b { specular } else { specular + self.diffuse_fitness(a, b) }
+    }
+
+    /// The part of Eq. 3 that the diffuse images make.
+    pub(crate) fn diffuse_fitness(&self, a: &Material, b: &Material) -> f64 {
+        let (albedo_a, albedo_b) = (a.bsdf().diffuse(), b.bsdf().diffuse());
         if albedo_a == albedo_b {
-            return specular;
+            return 0.0;
         }
+        let w = &self.metric.weights;
         let (a, b) = (self.diffuse_appearance(a, albedo_a), self.diffuse_appearance(b, albedo_b));
         let diffuse = w.diffuse_point * self.rms(&a.point, &b.point)
             + w.diffuse_environment * self.rms(&a.environment, &b.environment);
-        specular + w.diffuse * diffuse
+        w.diffuse * diffuse
+    }
+
+    /// What a unit of distance between two specular images adds to the fitness, by light: point, environment.
+    pub(crate) fn shares(&self) -> [f64; 2] {
+        let w = &self.metric.weights;
+        [w.specular_point, w.specular_environment].map(|light| w.specular * light / self.point.size() as f64)
+    }
+
+    /// Projections under both lights that leave differences between some appearances of at most about `tolerance` in
+    /// fitness.
+    pub(crate) fn fit_projections(&self, samples: &[Appearance], tolerance: f64) -> [Projection; 2] {
+        let [point, environment] = self.shares().map(|share| tolerance / share);
+        let fit = |planes: fn(&Appearance) -> &[f32], tolerance| {
+            let samples: Vec<&[f32]> = samples.iter().map(planes).collect();
+            Projection::fit(&samples, self.weights.as_deref(), tolerance)
+        };
+        [fit(|s| &s.point, point), fit(|s| &s.environment, environment)]
+    }
+
+    /// Renders materials and keeps no more of them than their coordinates.
+    pub(crate) fn sketches(
+        &self,
+        materials: &[Material],
+        [point, environment]: &[Projection; 2],
+    ) -> [Sketches; 2] {
+        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
+        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
+        let sketch = |renderer: &Renderer, projection: &Projection| {
+            let images = renderer.specular_batch(&bsdfs);
+            projection.project(images.len(), &|image, pixels, planes| {
+                lab_planes(&images[image][pixels], planes);
+            })
+        };
+        [sketch(&self.point, point), sketch(&self.environment, environment)]
+    }
+
+    /// The coordinates of appearances.
+    pub(crate) fn sketches_of(
+        &self,
+        seen: &[Appearance],
+        [point, environment]: &[Projection; 2],
+    ) -> [Sketches; 2] {
+        let sketch = |whole: fn(&Appearance) -> &[f32], projection: &Projection| {
+            projection.project(seen.len(), &|image, pixels, planes| {
+                let wholes = whole(&seen[image]).chunks_exact(self.point.subjects().len());
+                let parts = planes.chunks_exact_mut(pixels.len()).zip(wholes);
+                parts.for_each(|(part, whole)| part.copy_from_slice(&whole[pixels.clone()]));
+            })
+        };
+        [sketch(|s| &s.point, point), sketch(|s| &s.environment, environment)]
     }
 
     /// NRMSD per channel of the full pictures under the environment, whole image: without and with the mask.

@@ -5,13 +5,13 @@ use std::path::Path;
 
 use lookmatch_materials::Role;
 use lookmatch_search::{
-    Bounds, Exhaustive, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError,
-    by_name,
+    Bounds, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError, by_name,
 };
+use rayon::prelude::*;
 
 use crate::gallery::{Gallery, Match, Stopped};
 use crate::journal::Journal;
-use crate::table::FitnessTable;
+use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
 
 /// Levels by which a result may differ from what its neighbours foresaw.
@@ -25,11 +25,11 @@ pub enum Event {
         /// How many.
         done: usize,
     },
-    /// Before an exhaustive search: target points that were compared with all source points.
+    /// Before an exhaustive search: targets that were rendered, to be compared with all source points.
     Compared {
-        /// Compared points.
+        /// Rendered targets.
         done: usize,
-        /// All points of the target lattice.
+        /// All targets that look different.
         total: usize,
     },
     /// A source point is finished.
@@ -38,6 +38,8 @@ pub enum Event {
         done: usize,
         /// All points.
         total: usize,
+        /// Targets that were compared with it in full.
+        compared: usize,
     },
 }
 
@@ -52,6 +54,19 @@ pub fn remap(
     plan: &Plan,
     stage: &Stage,
     state: Option<&Path>,
+    observe: &mut dyn FnMut(Event),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Probe, RemapError> {
+    let certified = plan.search == "exhaustive";
+    run(plan, stage, state, certified, observe, stop)
+}
+
+/// [`remap()`]; `certified` finds optima through a [`FitnessTable`], where targets can be shared.
+fn run(
+    plan: &Plan,
+    stage: &Stage,
+    state: Option<&Path>,
+    certified: bool,
     observe: &mut dyn FnMut(Event),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Probe, RemapError> {
@@ -73,51 +88,93 @@ pub fn remap(
     }
     let pairing = Pairing::new(plan)?;
     let mut gallery = Gallery::new(plan, stage, &lattice);
-    let table = match plan.search.as_str() {
-        "exhaustive" if resumed < total => {
-            FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop)?
-        }
-        _ => None,
+    let table = if certified && resumed < total {
+        let table = FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop);
+        table.map_err(|e| interrupted(e, resumed, total))?
+    } else {
+        None
     };
     let mut done = resumed;
-    for (place, indices) in sources.points(&Bounds::full(&sources)).enumerate() {
-        if found[place].is_some() {
-            continue;
-        }
+    for wave in waves(plan, &sources, table.is_some()) {
         if stop() {
             return Err(RemapError::Interrupted { done, total });
         }
-        let values = sources.values(&indices);
-        let problem = match plan.strategy {
+        let wave: Vec<(usize, Point)> =
+            wave.into_iter().filter(|(place, _)| found[*place].is_none()).collect();
+        let values: Vec<Vec<f64>> = wave.iter().map(|(_, indices)| sources.values(indices)).collect();
+        let problem = |indices: &Point| match plan.strategy {
             Strategy::Unconstrained => pairing.alone(&lattice, plan.seed),
-            Strategy::Constrained => pairing.led(&lattice, plan.seed, &indices, &|p| {
+            Strategy::Constrained => pairing.led(&lattice, plan.seed, indices, &|p| {
                 found[place_of(&sources, p)].as_ref().map(|(point, _)| point)
             }),
         };
+        let problems: Vec<Problem> = wave.iter().map(|(_, indices)| problem(indices)).collect();
         let searched = match &table {
-            Some(table) => {
-                Exhaustive::default().run(&problem, &mut table.objective(place)).map_err(RemapError::Search)
-            }
-            None => search_one(plan, &mut gallery, &values, &problem, stop),
+            Some(table) => search_all(plan, table, &values, problems, stop),
+            None => (values.iter().zip(&problems))
+                .map(|(values, problem)| search_one(plan, &mut gallery, values, problem, stop))
+                .map(|outcome| outcome.map(|outcome| Found { compared: outcome.evaluations, outcome }))
+                .collect(),
         };
-        let outcome = match searched {
-            Err(RemapError::Search(SearchError::Objective(e))) if e.is::<Stopped>() => {
-                return Err(RemapError::Interrupted { done, total });
+        let results: Vec<Found> = searched.map_err(|e| interrupted(e, done, total))?;
+        let entries = values.into_par_iter().zip(&results);
+        let entries = entries.map(|(values, found)| entry(plan, stage, &lattice, values, &found.outcome));
+        let entries: Vec<Entry> = entries.collect::<Result<_, _>>()?;
+        for (((place, _), Found { outcome, compared }), entry) in wave.into_iter().zip(results).zip(entries) {
+            if let Some(journal) = &mut journal {
+                journal.append(place, &outcome.best, &entry)?;
             }
-            other => other?,
-        };
-        let entry = entry(plan, stage, &lattice, values, &outcome)?;
-        if let Some(journal) = &mut journal {
-            journal.append(place, &outcome.best, &entry)?;
+            found[place] = Some((outcome.best, entry));
+            done += 1;
+            observe(Event::Point { done, total, compared });
         }
-        found[place] = Some((outcome.best, entry));
-        done += 1;
-        observe(Event::Point { done, total });
     }
     if let Some(journal) = journal {
         journal.remove();
     }
     Ok(Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len()))
+}
+
+/// An error of a search, with what was done where it was stopped from outside.
+fn interrupted(error: RemapError, done: usize, total: usize) -> RemapError {
+    match error {
+        RemapError::Search(SearchError::Objective(e)) if e.is::<Stopped>() => {
+            RemapError::Interrupted { done, total }
+        }
+        other => other,
+    }
+}
+
+/// Source points in groups that can be searched together, with their places; each only needs the results of earlier
+/// groups.
+fn waves(plan: &Plan, sources: &Lattice, together: bool) -> Vec<Vec<(usize, Point)>> {
+    let mut points: Vec<(usize, Point)> = sources.points(&Bounds::full(sources)).enumerate().collect();
+    // Neighbours that lead a point have a smaller sum of indices.
+    let rank = |(_, point): &(usize, Point)| match plan.strategy {
+        Strategy::Constrained => point.iter().sum::<u32>(),
+        Strategy::Unconstrained => 0,
+    };
+    if !together {
+        return points.into_iter().map(|point| vec![point]).collect();
+    }
+    points.sort_by_key(rank);
+    let groups = points.chunk_by(|a, b| rank(a) == rank(b));
+    groups.flat_map(|group| group.chunks(BATCH)).map(<[_]>::to_vec).collect()
+}
+
+/// Searches the targets of several source points that do not depend on each other.
+fn search_all(
+    plan: &Plan,
+    table: &FitnessTable,
+    values: &[Vec<f64>],
+    problems: Vec<Problem>,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<Found>, RemapError> {
+    let task = |(values, problem): (&Vec<f64>, Problem)| {
+        Ok(Task { source: plan.source_material(values)?, bounds: problem.bounds })
+    };
+    let tasks = values.iter().zip(problems).map(task).collect::<Result<Vec<_>, RemapError>>()?;
+    table.search(&tasks, stop)
 }
 
 /// Searches the target of one source point.
@@ -289,4 +346,95 @@ fn guesses<'f>(
 /// `a + b − c`, no index below 0.
 fn combine(a: &Point, b: &Point, c: &Point) -> Point {
     a.iter().zip(b).zip(c).map(|((a, b), c)| (a + b).saturating_sub(*c)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Assignment, Options, Preset, Side, Vary};
+    use lookmatch_materials::Levels;
+
+    fn vary(side: Side, name: &str, (min, max, step): (f64, f64, f64)) -> Vary {
+        Vary { side: Some(side), name: name.into(), levels: Levels::new(min, max, step) }
+    }
+
+    /// Ward to GGX with 5 × 4 source points, dark ones among them, and 2 × 13 × 18 targets.
+    fn options(strategy: Strategy, mask: bool) -> Options {
+        Options {
+            strategy,
+            search: "exhaustive".into(),
+            mask,
+            preset: Some(Preset::Paper),
+            size: Some(40),
+            vary: vec![
+                vary(Side::Source, "specular", (0.0, 0.2, 0.05)),
+                vary(Side::Source, "roughness", (0.03, 0.63, 0.2)),
+                vary(Side::Target, "ior", (1.1, 2.3, 0.1)),
+                vary(Side::Target, "roughness", (0.02, 0.70, 0.04)),
+            ],
+            ..Options::default()
+        }
+    }
+
+    fn plan(from: &str, options: &Options) -> Plan {
+        let model = |name| lookmatch_materials::by_name(name).unwrap();
+        Plan::new(model(from), model("ggx"), options).unwrap()
+    }
+
+    /// Entries, and the targets that were compared in full.
+    fn entries(plan: &Plan, stage: &Stage, certified: bool) -> (Vec<Entry>, usize) {
+        let mut sum = 0;
+        let mut observe = |event: Event| {
+            if let Event::Point { compared, .. } = event {
+                sum += compared;
+            }
+        };
+        let probe = run(plan, stage, None, certified, &mut observe, &|| false).unwrap();
+        (probe.entries, sum)
+    }
+
+    #[test]
+    fn certified_optima_are_those_of_brute_force_on_any_number_of_threads() {
+        for mask in [false, true] {
+            let stage = Stage::prepare(&plan("ward", &options(Strategy::Constrained, mask))).unwrap();
+            for strategy in [Strategy::Constrained, Strategy::Unconstrained] {
+                let plan = plan("ward", &options(strategy, mask));
+                let (brute, all) = entries(&plan, &stage, false);
+                for threads in [1, 3] {
+                    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                    let (certified, compared) = pool.install(|| entries(&plan, &stage, true));
+                    assert_eq!(certified, brute);
+                    assert!(compared < all / 20, "{compared} of {all} compared in full");
+                }
+            }
+        }
+    }
+
+    /// A conductor has no diffuse reflectance to hand over: the target keeps its own.
+    #[test]
+    fn certified_optima_with_a_diffuse_term() {
+        let mut options = options(Strategy::Unconstrained, false);
+        options.vary.retain(|v| v.side == Some(Side::Target));
+        let plan = plan("beckmann-conductor", &options);
+        let stage = Stage::prepare(&plan).unwrap();
+        assert_eq!(entries(&plan, &stage, true).0, entries(&plan, &stage, false).0);
+    }
+
+    #[test]
+    fn the_first_of_all_ties_wins() {
+        let dark = Assignment { side: Some(Side::Target), name: "specular".into(), value: "0".into() };
+        let plan = plan("ward", &Options { fix: vec![dark], ..options(Strategy::Constrained, false) });
+        let stage = Stage::prepare(&plan).unwrap();
+        let (certified, _) = entries(&plan, &stage, true);
+        assert_eq!(certified, entries(&plan, &stage, false).0);
+        assert_eq!(certified[0].target, [1.1, 0.02]);
+    }
+
+    #[test]
+    fn a_stopped_table_says_so() {
+        let plan = plan("ward", &options(Strategy::Unconstrained, false));
+        let stage = Stage::prepare(&plan).unwrap();
+        let error = remap(&plan, &stage, None, &mut |_| {}, &|| true).unwrap_err();
+        assert!(matches!(error, RemapError::Interrupted { done: 0, total: 20 }), "{error}");
+    }
 }

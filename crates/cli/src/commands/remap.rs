@@ -71,7 +71,7 @@ fn search(plan: &Plan, args: &RemapArgs) -> anyhow::Result<Probe> {
             progress.set_position(done as u64);
             progress.suspend(|| eprintln!("going on after {done} source points of an earlier run"));
         }
-        Event::Compared { done, total } => progress.set_message(format!("comparing {done}/{total} targets;")),
+        Event::Compared { done, total } => progress.set_message(format!("rendering {done}/{total} targets;")),
         Event::Point { done, .. } => {
             progress.set_message("matching");
             progress.set_position(done as u64);
