@@ -44,8 +44,8 @@ pub(crate) struct Density {
 pub(crate) fn moments(field: &Field, points: &[View], density: Density) -> Moments {
     let mut moments = [[[0.0; 4]; TERMS]; NODES];
     let level = Level::new();
-    dispatch!(level, simd => Gatherer::new(simd, field, points, density, None).gather(|j, hat, sums, _| {
-        deposit(&mut moments, j, hat, sums);
+    dispatch!(level, simd => Gatherer::new(simd, field, points, density, None).gather(|j, sums, _| {
+        moments[j] = *sums;
     }));
     moments
 }
@@ -60,9 +60,9 @@ pub(crate) fn moments_with(
     let mut moments = [[[0.0; 4]; TERMS]; NODES];
     let mut of_functions = Box::new([[[0.0; functions::COUNT]; FUNCTION_TERMS]; NODES]);
     let level = Level::new();
-    dispatch!(level, simd => Gatherer::new(simd, field, points, density, Some(functions)).gather(|j, hat, sums, more| {
-        deposit(&mut moments, j, hat, sums);
-        deposit(&mut of_functions, j, hat, more);
+    dispatch!(level, simd => Gatherer::new(simd, field, points, density, Some(functions)).gather(|j, sums, more| {
+        moments[j] = *sums;
+        of_functions[j] = *more;
     }));
     (moments, of_functions)
 }
@@ -103,29 +103,33 @@ fn hemisphere<S: Simd>(simd: S, field: &Field, place: &Place) -> [f32; 4] {
     // Each direction stands for an equal share of the projected hemisphere.
     let width = OVERLAP * (PI / HEMISPHERE as f32).sqrt();
     let mut sums = [f32x16::splat(simd, 0.0); 4];
-    for directions in COSINE_DIRECTIONS.iter() {
-        let local = directions.map(|axis| f32x16::load_array(simd, axis));
+    let mut hits = Hits::default();
+    for [x, y, z] in COSINE_DIRECTIONS.iter() {
+        let local =
+            [f32x16::load_array(simd, *x), f32x16::load_array(simd, *y), f32x16::load_array(simd, *z)];
         let width = f32x16::splat(simd, width) / local[2].max(0.05).sqrt();
-        let hits = gatherer.look(gatherer.to_world(local), width, local[2].simd_gt(0.0));
-        (0..4).for_each(|c| sums[c] += f32x16::load_array(simd, hits.light[c]));
-    }
-    sums.map(|sum| sum.reduce_sum() * (PI / HEMISPHERE as f32))
-}
-
-/// Adds what was found on a ring to the two hat functions that it lies under.
-#[inline(always)]
-fn deposit<const K: usize, const N: usize>(
-    moments: &mut [[[f32; N]; K]; NODES],
-    interval: usize,
-    hat: f32,
-    sums: &[[f32; N]; K],
-) {
-    for k in 0..K {
-        for c in 0..N {
-            moments[interval][k][c] += sums[k][c] * (1.0 - hat);
-            moments[interval + 1][k][c] += sums[k][c] * hat;
+        gatherer.look(gatherer.to_world(local), width, local[2].simd_gt(0.0), &mut hits);
+        for c in 0..4 {
+            sums[c] += f32x16::load_array(simd, hits.light[c]);
         }
     }
+    let mut irradiance = [0.0; 4];
+    for c in 0..4 {
+        irradiance[c] = total(sums[c]) * (PI / HEMISPHERE as f32);
+    }
+    irradiance
+}
+
+/// The sum of all lanes, in pairs.
+#[inline(always)]
+fn total<S: Simd>(lanes: f32x16<S>) -> f32 {
+    let mut sums = lanes.to_array();
+    for half in [8, 4, 2, 1] {
+        for l in 0..half {
+            sums[l] += sums[l + half];
+        }
+    }
+    sums[0]
 }
 
 /// Three coordinates in lanes.
@@ -151,7 +155,8 @@ impl<S: Simd> Vec3<S> {
     /// `self + t · direction`
     #[inline(always)]
     fn along(self, t: f32x16<S>, direction: Self) -> Self {
-        Self(std::array::from_fn(|k| t.mul_add(direction.0[k], self.0[k])))
+        let ([a, b, c], [x, y, z]) = (self.0, direction.0);
+        Self([t.mul_add(x, a), t.mul_add(y, b), t.mul_add(z, c)])
     }
 }
 
@@ -217,24 +222,28 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         }
     }
 
-    /// Walks all rings; hands over, for each, its interval, the share of the right-hand hat function, and its sums.
+    /// Walks all rings; hands over, for each node, its moments and those of the functions.
     #[inline(always)]
     fn gather(
         &mut self,
-        mut found: impl FnMut(usize, f32, &[[f32; 4]; TERMS], &[[f32; functions::COUNT]; FUNCTION_TERMS]),
+        mut found: impl FnMut(usize, &[[f32; 4]; TERMS], &[[f32; functions::COUNT]; FUNCTION_TERMS]),
     ) {
         if self.points.is_empty() {
             return;
         }
+        let (mut left, mut right) = (Sums::new(self.simd), Sums::new(self.simd));
         for interval in 0..NODES - 1 {
             for stratum in 0..self.density.strata {
                 let hat = (stratum as f64 + 0.5) / self.density.strata as f64;
-                let Some(samples) = self.ring(interval, stratum, hat) else { continue };
-                let mut more = [[0.0; functions::COUNT]; FUNCTION_TERMS];
-                let sums = self.ring_moments(&samples, &mut more);
-                found(interval, hat as f32, &sums, &more);
+                if let Some(samples) = self.ring(interval, stratum, hat) {
+                    self.add_ring(&samples, hat as f32, &mut left, &mut right);
+                }
             }
+            found(interval, &left.totals(), &left.functions);
+            left = right;
+            right = Sums::new(self.simd);
         }
+        found(NODES - 1, &left.totals(), &left.functions);
     }
 
     /// The samples of a ring; `None` where it lies below the horizon.
@@ -265,16 +274,17 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         })
     }
 
+    /// Adds the samples of a ring to the two hat functions that it lies under.
     #[inline(always)]
-    fn ring_moments(
-        &self,
-        ring: &Samples,
-        more: &mut [[f32; functions::COUNT]; FUNCTION_TERMS],
-    ) -> [[f32; 4]; TERMS] {
+    fn add_ring(&self, ring: &Samples, hat: f32, left: &mut Sums<S>, right: &mut Sums<S>) {
         let simd = self.simd;
-        let order: Lanes = std::array::from_fn(|l| ((5 * l + ring.turn) % LANES) as f32);
+        let mut order = [0.0; LANES];
+        for (l, place) in order.iter_mut().enumerate() {
+            *place = ((5 * l + ring.turn) % LANES) as f32;
+        }
         let order = f32x16::load_array(simd, order);
-        let mut sums = [[f32x16::splat(simd, 0.0); 4]; TERMS];
+        let mut sums = Sums::new(simd);
+        let mut hits = Hits::default();
         for start in (0..ring.count).step_by(LANES) {
             let azimuth = (order + start as f32).mul_add(ring.spacing, ring.first);
             let (sin_phi, cos_phi) = sin_cos(azimuth);
@@ -286,39 +296,44 @@ impl<'a, S: Simd> Gatherer<'a, S> {
             let solid_angle = cos_d * (4.0 * OVERLAP * OVERLAP * ring.step * ring.sin_h * ring.spacing);
             let width = (solid_angle.max(0.0) + self.density.spread * self.density.spread).sqrt();
             let x = ((cos_d - ring.middle) * ring.swing.recip()).max(-1.0).min(1.0);
-            let hits = self.look(direction, width, lit);
-            let light = hits.light.map(|lanes| f32x16::load_array(simd, lanes));
+            self.look(direction, width, lit, &mut hits);
             let mut polynomials = [f32x16::splat(simd, 1.0); TERMS];
             polynomials[1] = x;
             for k in 2..TERMS {
                 polynomials[k] = (x * 2.0).mul_sub(polynomials[k - 1], polynomials[k - 2]);
             }
-            for (sums, polynomial) in sums.iter_mut().zip(polynomials) {
-                (0..4).for_each(|c| sums[c] = polynomial.mul_add(light[c], sums[c]));
+            for c in 0..4 {
+                let light = f32x16::load_array(simd, hits.light[c]);
+                for k in 0..TERMS {
+                    sums.light[k][c] = polynomials[k].mul_add(light, sums.light[k][c]);
+                }
             }
             if let Some(functions) = self.functions {
-                add_functions(functions, &hits, &x.to_array(), more);
+                add_functions(functions, &hits, &x.to_array(), &mut sums.functions);
             }
         }
         let weight = ring.spacing * ring.step;
-        more.iter_mut().flatten().for_each(|sum| *sum *= weight);
-        sums.map(|sums| sums.map(|lanes| lanes.reduce_sum() * weight))
+        left.add(&sums, weight * (1.0 - hat));
+        right.add(&sums, weight * hat);
     }
 
     #[inline(always)]
-    fn to_world(&self, local: [f32x16<S>; 3]) -> Vec3<S> {
-        Vec3(std::array::from_fn(|k| {
-            let axis = |a: usize| self.frame[a].0[k];
-            local[0].mul_add(axis(0), local[1].mul_add(axis(1), local[2] * axis(2)))
-        }))
+    fn to_world(&self, [x, y, z]: [f32x16<S>; 3]) -> Vec3<S> {
+        // Written out: a closure would not be compiled for the instruction set.
+        let [[tx, ty, tz], [bx, by, bz], [nx, ny, nz]] = [self.frame[0].0, self.frame[1].0, self.frame[2].0];
+        Vec3([
+            x.mul_add(tx, y.mul_add(bx, z * nx)),
+            x.mul_add(ty, y.mul_add(by, z * ny)),
+            x.mul_add(tz, y.mul_add(bz, z * nz)),
+        ])
     }
 
     /// What arrives from some directions, averaged over `width` radians; black where not `lit`.
     #[inline(always)]
-    fn look(&self, direction: Vec3<S>, width: f32x16<S>, lit: mask32x16<S>) -> Hits {
+    fn look(&self, direction: Vec3<S>, width: f32x16<S>, lit: mask32x16<S>, hits: &mut Hits) {
         let simd = self.simd;
         let (sphere_distance, sphere) = self.nearest_sphere(direction);
-        let mut hits = Hits::default();
+        hits.light = [[0.0; LANES]; 4];
         let lit = lit.to_bitmask();
         let mut on_plane = 0;
         let (mut u, mut v, mut level) =
@@ -367,7 +382,6 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         }
         hits.on_plane = on_plane;
         (hits.u, hits.v) = (u, v);
-        hits
     }
 
     /// Distance of the checkerboard below which a ray starts from it.
@@ -386,7 +400,8 @@ impl<'a, S: Simd> Gatherer<'a, S> {
             return (nearest, [f32::MAX; LANES]);
         }
         for (centre, radius) in self.field.bodies.spheres() {
-            let from_centre = Vec3(std::array::from_fn(|k| self.position.0[k] - centre[k] as f32));
+            let [x, y, z] = self.position.0;
+            let from_centre = Vec3([x - centre.x as f32, y - centre.y as f32, z - centre.z as f32]);
             let along = from_centre.dot(direction);
             let axis = from_centre.along(-along, direction);
             let discriminant = -axis.dot(axis) + (radius * radius) as f32;
@@ -406,6 +421,49 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         let place: Place = self.points[lane % self.points.len()].point.place;
         let [x, y, z] = direction.0.map(|axis| f64::from(axis[lane]));
         self.field.body_radiance(&place, DVec3::new(x, y, z).normalize(), 0.0).unwrap_or(Rgb::ZERO)
+    }
+}
+
+/// Sums over samples: of light for each polynomial and channel, of functions for each polynomial and function.
+#[derive(Clone, Copy)]
+struct Sums<S: Simd> {
+    light: [[f32x16<S>; 4]; TERMS],
+    functions: [[f32; functions::COUNT]; FUNCTION_TERMS],
+}
+
+impl<S: Simd> Sums<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        Self {
+            light: [[f32x16::splat(simd, 0.0); 4]; TERMS],
+            functions: [[0.0; functions::COUNT]; FUNCTION_TERMS],
+        }
+    }
+
+    /// Adds `weight` times other sums.
+    #[inline(always)]
+    fn add(&mut self, other: &Self, weight: f32) {
+        for k in 0..TERMS {
+            for c in 0..4 {
+                self.light[k][c] = other.light[k][c].mul_add(weight, self.light[k][c]);
+            }
+        }
+        for k in 0..FUNCTION_TERMS {
+            for a in 0..functions::COUNT {
+                self.functions[k][a] += weight * other.functions[k][a];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn totals(&self) -> [[f32; 4]; TERMS] {
+        let mut totals = [[0.0; 4]; TERMS];
+        for k in 0..TERMS {
+            for c in 0..4 {
+                totals[k][c] = total(self.light[k][c]);
+            }
+        }
+        totals
     }
 }
 

@@ -98,6 +98,13 @@ impl Film {
         (self.subject_points(bodies, pixel, EDGE_SUBSAMPLES), EDGE_SUBSAMPLES)
     }
 
+    /// By how much the `count` points of a pixel's first [`SUBSAMPLES`] positions under- or overestimate its coverage.
+    pub(crate) fn coverage_of(&self, bodies: &Bodies, pixel: usize, count: usize) -> f32 {
+        let (points, positions) = self.points(bodies, pixel);
+        let exact = points.len() as f32 / positions as f32;
+        exact * SUBSAMPLES as f32 / count.max(1) as f32
+    }
+
     fn subject_point(&self, bodies: &Bodies, direction: DVec3) -> Option<SurfacePoint> {
         let (distance, Body::Sphere(sphere)) = bodies.first(self.eye, direction, None)? else { return None };
         let position = self.eye + direction * distance;

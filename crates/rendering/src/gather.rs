@@ -44,7 +44,8 @@ pub(crate) fn radiance(field: &Field, film: &Film, pixel: usize, bsdf: &dyn Bsdf
         let [r, g, b] = bsdf.specular(&g).map(|f| (f * weight) as f32);
         sum += light * Rgb::new(r, g, b, 0.0);
     }
-    sum / samples as f32 + lamps(field, &points, bsdf)
+    let sum = sum / samples as f32 + lamps(field, &points, bsdf);
+    sum * film.coverage_of(&field.bodies, pixel, points.len())
 }
 
 /// What the environment's lamps add away from their highlights: evaluated directly, as point lights are.

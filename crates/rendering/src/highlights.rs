@@ -108,8 +108,7 @@ fn pixel_samples(field: &Field, film: &Film, pixel: usize) -> Vec<Sample> {
     }
     samples.extend(lamp_samples(field, &points, width));
     // Along silhouettes the few points count for as much of the pixel as many cover.
-    let (all, count) = film.points(&field.bodies, pixel);
-    let share = all.len() as f32 / count as f32 * SUBSAMPLES as f32 / points.len().max(1) as f32;
+    let share = film.coverage_of(&field.bodies, pixel, points.len());
     samples.iter_mut().for_each(|(_, irradiance)| *irradiance *= share);
     samples
 }
