@@ -21,6 +21,8 @@ use crate::sampling::cosine_direction;
 /// Width of a look-up in units of the distance between samples: neighbours overlap, so that a small bright light between
 /// them is missed by neither.
 const OVERLAP: f32 = 1.5;
+/// The first of the outer intervals between nodes: 30° from the normal.
+const OUTER: usize = 20;
 /// Terms that are kept of the moments of functions on the checkerboard.
 pub(crate) const FUNCTION_TERMS: usize = 2;
 
@@ -34,8 +36,9 @@ pub(crate) type FunctionMoments = [[[f32; functions::COUNT]; FUNCTION_TERMS]; NO
 /// How densely the rings are sampled.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Density {
-    /// Rings between two nodes.
-    pub(crate) strata: usize,
+    /// Rings between two nodes: the inner ones and, beyond [`OUTER`], those that are longest by far and matter to wide lobes
+    /// alone.
+    pub(crate) strata: [usize; 2],
     /// Angle between mirrored views of neighbouring points of the row, in radians.
     pub(crate) spread: f32,
 }
@@ -98,20 +101,23 @@ fn hemisphere<S: Simd>(simd: S, field: &Field, place: &Place) -> [f32; 4] {
         sine: 0.0,
     };
     let points = [view];
-    let density = Density { strata: 1, spread: 0.0 };
+    let density = Density { strata: [1, 1], spread: 0.0 };
     let gatherer = Gatherer { sky: None, ..Gatherer::new(simd, field, &points, density, None) };
     // Each direction stands for an equal share of the projected hemisphere.
     let width = OVERLAP * (PI / HEMISPHERE as f32).sqrt();
     let mut sums = [f32x16::splat(simd, 0.0); 4];
-    let mut hits = Hits::default();
-    for [x, y, z] in COSINE_DIRECTIONS.iter() {
+    let mut hits = [Hits::default(), Hits::default()];
+    for (round, [x, y, z]) in COSINE_DIRECTIONS.iter().enumerate() {
         let local =
             [f32x16::load_array(simd, *x), f32x16::load_array(simd, *y), f32x16::load_array(simd, *z)];
         let width = f32x16::splat(simd, width) / local[2].max(0.05).sqrt();
-        gatherer.look(gatherer.to_world(local), width, local[2].simd_gt(0.0), &mut hits);
+        gatherer.look(gatherer.to_world(local), width, local[2].simd_gt(0.0), &mut hits[round % 2]);
         for c in 0..4 {
-            sums[c] += f32x16::load_array(simd, hits.light[c]);
+            sums[c] += f32x16::load_array(simd, hits[(round + 1) % 2].light[c]);
         }
+    }
+    for c in 0..4 {
+        sums[c] += f32x16::load_array(simd, hits[(COSINE_DIRECTIONS.len() + 1) % 2].light[c]);
     }
     let mut irradiance = [0.0; 4];
     for c in 0..4 {
@@ -189,6 +195,8 @@ struct Samples {
     count: usize,
     /// Range of θ_h that the ring stands for.
     step: f32,
+    /// Share of the right-hand hat function.
+    hat: f32,
     /// Which lane comes first.
     turn: usize,
 }
@@ -233,10 +241,10 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         }
         let (mut left, mut right) = (Sums::new(self.simd), Sums::new(self.simd));
         for interval in 0..NODES - 1 {
-            for stratum in 0..self.density.strata {
-                let hat = (stratum as f64 + 0.5) / self.density.strata as f64;
-                if let Some(samples) = self.ring(interval, stratum, hat) {
-                    self.add_ring(&samples, hat as f32, &mut left, &mut right);
+            let strata = self.density.strata[usize::from(interval >= OUTER)];
+            for stratum in 0..strata {
+                if let Some(samples) = self.ring(interval, stratum, strata) {
+                    self.add_ring(&samples, &mut left, &mut right);
                 }
             }
             found(interval, &left.totals(), &left.functions);
@@ -248,12 +256,13 @@ impl<'a, S: Simd> Gatherer<'a, S> {
 
     /// The samples of a ring; `None` where it lies below the horizon.
     #[inline(always)]
-    fn ring(&self, interval: usize, stratum: usize, hat: f64) -> Option<Samples> {
+    fn ring(&self, interval: usize, stratum: usize, strata: usize) -> Option<Samples> {
+        let hat = (stratum as f64 + 0.5) / strata as f64;
         let width = node(interval + 1) - node(interval);
-        let (theta, step) = (node(interval) + hat * width, width / self.density.strata as f64);
+        let (theta, step) = (node(interval) + hat * width, width / strata as f64);
         let (sin_h, cos_h) = theta.sin_cos();
         let ring = Ring::new(self.mean, (cos_h, sin_h))?;
-        let number = interval * self.density.strata + stratum;
+        let number = interval * strata + stratum;
         // As far apart along the ring as the rings are from each other, and at least one for each lane.
         let wanted = 2.0 * ring.half_angle * sin_h / step;
         let count = (wanted / LANES as f64).round().max(1.0) as usize * LANES;
@@ -270,13 +279,14 @@ impl<'a, S: Simd> Gatherer<'a, S> {
             spacing: spacing as f32,
             count,
             step: step as f32,
+            hat: hat as f32,
             turn: 3 * number,
         })
     }
 
     /// Adds the samples of a ring to the two hat functions that it lies under.
     #[inline(always)]
-    fn add_ring(&self, ring: &Samples, hat: f32, left: &mut Sums<S>, right: &mut Sums<S>) {
+    fn add_ring(&self, ring: &Samples, left: &mut Sums<S>, right: &mut Sums<S>) {
         let simd = self.simd;
         let mut order = [0.0; LANES];
         for (l, place) in order.iter_mut().enumerate() {
@@ -284,8 +294,10 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         }
         let order = f32x16::load_array(simd, order);
         let mut sums = Sums::new(simd);
-        let mut hits = Hits::default();
-        for start in (0..ring.count).step_by(LANES) {
+        // Samples are added one round late: what was just stored lane by lane cannot be loaded as a whole at once.
+        let mut hits = [Hits::default(), Hits::default()];
+        let mut last = f32x16::splat(simd, 0.0);
+        for (round, start) in (0..ring.count).step_by(LANES).enumerate() {
             let azimuth = (order + start as f32).mul_add(ring.spacing, ring.first);
             let (sin_phi, cos_phi) = sin_cos(azimuth);
             let cos_d = (self.sine * ring.sin_h).mul_add(cos_phi, self.cosine * ring.cos_h);
@@ -296,25 +308,14 @@ impl<'a, S: Simd> Gatherer<'a, S> {
             let solid_angle = cos_d * (4.0 * OVERLAP * OVERLAP * ring.step * ring.sin_h * ring.spacing);
             let width = (solid_angle.max(0.0) + self.density.spread * self.density.spread).sqrt();
             let x = ((cos_d - ring.middle) * ring.swing.recip()).max(-1.0).min(1.0);
-            self.look(direction, width, lit, &mut hits);
-            let mut polynomials = [f32x16::splat(simd, 1.0); TERMS];
-            polynomials[1] = x;
-            for k in 2..TERMS {
-                polynomials[k] = (x * 2.0).mul_sub(polynomials[k - 1], polynomials[k - 2]);
-            }
-            for c in 0..4 {
-                let light = f32x16::load_array(simd, hits.light[c]);
-                for k in 0..TERMS {
-                    sums.light[k][c] = polynomials[k].mul_add(light, sums.light[k][c]);
-                }
-            }
-            if let Some(functions) = self.functions {
-                add_functions(functions, &hits, &x.to_array(), &mut sums.functions);
-            }
+            self.look(direction, width, lit, &mut hits[round % 2]);
+            sums.add_samples(&hits[(round + 1) % 2], last, self.functions);
+            last = x;
         }
+        sums.add_samples(&hits[(ring.count / LANES + 1) % 2], last, self.functions);
         let weight = ring.spacing * ring.step;
-        left.add(&sums, weight * (1.0 - hat));
-        right.add(&sums, weight * hat);
+        left.add(&sums, weight * (1.0 - ring.hat));
+        right.add(&sums, weight * ring.hat);
     }
 
     #[inline(always)]
@@ -437,6 +438,25 @@ impl<S: Simd> Sums<S> {
         Self {
             light: [[f32x16::splat(simd, 0.0); 4]; TERMS],
             functions: [[0.0; functions::COUNT]; FUNCTION_TERMS],
+        }
+    }
+
+    /// Adds sixteen samples at the positions `x` of their ring.
+    #[inline(always)]
+    fn add_samples(&mut self, hits: &Hits, x: f32x16<S>, functions: Option<&Functions>) {
+        let mut polynomials = [x; TERMS];
+        polynomials[0] = f32x16::splat(x.token(), 1.0);
+        for k in 2..TERMS {
+            polynomials[k] = (x * 2.0).mul_sub(polynomials[k - 1], polynomials[k - 2]);
+        }
+        for c in 0..4 {
+            let light = f32x16::load_array(x.token(), hits.light[c]);
+            for k in 0..TERMS {
+                self.light[k][c] = polynomials[k].mul_add(light, self.light[k][c]);
+            }
+        }
+        if let Some(functions) = functions {
+            add_functions(functions, hits, &x.to_array(), &mut self.functions);
         }
     }
 

@@ -518,7 +518,7 @@ impl Light {
         let normal = self.field.bodies.normal(sphere, position);
         let place = Place { position, normal, body };
         let view = [View::new(SurfacePoint { place, sphere, wo: -direction })];
-        let density = Density { strata: 1, spread: 0.0 };
+        let density = Density { strata: [1, 1], spread: 0.0 };
         let (moments, functions) = match &back {
             Some(_) => arcs::moments_with(&self.field, &self.chi, &view, density),
             None => (arcs::moments(&self.field, &view, density), Box::default()),

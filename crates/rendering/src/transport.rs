@@ -21,8 +21,8 @@ use crate::rows::{Row, Rows, View};
 /// neighbouring bundles share coefficients.
 const ANGLE_STEP: f64 = 1e-3;
 
-/// Rings sampled between two nodes.
-const STRATA: usize = 8;
+/// Rings sampled between two nodes, inner and outer ones.
+const STRATA: [usize; 2] = [8, 5];
 
 /// The light that reaches all subject pixels, in the basis of the rings.
 #[derive(Clone, Debug)]
@@ -156,7 +156,7 @@ impl Bundle {
 }
 
 /// Rings between two nodes for the modes of the interreflection: only their means over the checkerboard are needed.
-const MODE_STRATA: usize = 2;
+const MODE_STRATA: [usize; 2] = [2, 2];
 
 impl Reflected {
     /// Sets the lane of a row whose moments are known.
