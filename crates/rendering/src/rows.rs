@@ -8,8 +8,10 @@ use crate::product::LANES;
 
 /// Range of angles of view, in radians, that one row stands for.
 const NARROW: f64 = 0.05;
-/// Rows of a pixel with a wider range.
-const PARTS: usize = 4;
+/// The same in pixels with a wider range: along silhouettes, where lobes depend on the angle most.
+const GRAZING: f64 = 0.02;
+/// Rows of a pixel at most.
+const PARTS: usize = 12;
 
 /// A sub-pixel point with the frame whose tangent lies in the plane of its view.
 #[derive(Clone, Copy)]
@@ -91,7 +93,10 @@ fn parts(field: &Field, film: &Film, pixel: u32) -> Vec<(Vec<View>, f32)> {
     let mut views: Vec<View> = points.into_iter().map(View::new).collect();
     let angles = || views.iter().map(View::angle);
     let (least, most) = (angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max));
-    let parts = if most - least <= NARROW { 1 } else { PARTS };
+    let parts = match most - least {
+        range if range <= NARROW => 1,
+        range => ((range / GRAZING).ceil() as usize).min(PARTS),
+    };
     views.sort_by(|a, b| a.angle().total_cmp(&b.angle()));
     let size = views.len().div_ceil(parts).max(1);
     let part = |views: &[View]| (thinned(views), views.len() as f32 / count as f32);

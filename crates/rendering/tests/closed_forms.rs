@@ -226,14 +226,13 @@ fn a_white_sphere_vanishes_in_a_white_furnace() {
     let folder = tempfile::tempdir().unwrap();
     let image = picture(&furnace(folder.path()), Illumination::Environment, "lambert:diffuse=1");
     let worst = image.pixels().iter().flatten().map(|v| (v - 1.0).abs()).fold(0.0, f32::max);
-    // The 2048 lights that stand for the map leave 1.2e-3 where one of them straddles the horizon.
-    assert!(worst < 2e-3, "{worst}");
+    assert!(worst < 1e-3, "{worst}");
 }
 
 #[test]
 fn energy_never_appears() {
     let folder = tempfile::tempdir().unwrap();
-    let renderer = Renderer::prepare(&furnace(folder.path()), Illumination::Environment, 40).unwrap();
+    let renderer = Renderer::prepare(&furnace(folder.path()), Illumination::Environment, 160).unwrap();
     let renderer = renderer.keep_transport();
     for roughness in ["0.01", "0.02", "0.05", "0.1", "0.2", "0.4", "0.7", "1"] {
         // F0 above 0.999.
