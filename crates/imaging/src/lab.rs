@@ -41,6 +41,17 @@ pub fn lab_planes(pixels: &[[f32; 3]], out: &mut [f32]) {
     planes_dispatched(pixels, out);
 }
 
+/// [`lab_planes`] of pixels that are given as three planes, red, green and blue.
+///
+/// # Panics
+/// If the planes have different lengths, or `out` is not three times as long.
+pub fn lab_planes_of(planes: [&[f32]; 3], out: &mut [f32]) {
+    let [red, green, blue] = planes;
+    assert!(red.len() == green.len() && red.len() == blue.len(), "planes of one length are needed");
+    assert_eq!(out.len(), 3 * red.len(), "three planes of one value per pixel are needed");
+    planar_dispatched(planes, out);
+}
+
 /// Sum of squared differences of two slices of equal length.
 ///
 /// Added in `f32` over blocks of 1024 values and in `f64` over the blocks, in a fixed order: the result is the same
@@ -75,6 +86,11 @@ fn planes_dispatched(pixels: &[[f32; 3]], out: &mut [f32]) {
 }
 
 #[multiversion(targets = "simd")]
+fn planar_dispatched(planes: [&[f32]; 3], out: &mut [f32]) {
+    planar(planes, out);
+}
+
+#[multiversion(targets = "simd")]
 fn distance_dispatched(a: &[f32], b: &[f32]) -> f64 {
     distance(a, b)
 }
@@ -104,6 +120,23 @@ fn planes(pixels: &[[f32; 3]], out: &mut [f32]) {
 }
 
 #[inline(always)]
+fn planar([red, green, blue]: [&[f32]; 3], out: &mut [f32]) {
+    let (lightness, rest) = out.split_at_mut(red.len());
+    let (a_star, b_star) = rest.split_at_mut(red.len());
+    for start in (0..red.len()).step_by(PIXELS) {
+        let block = start..(start + PIXELS).min(red.len());
+        let mut rgb = [[0.0; PIXELS]; 3];
+        rgb[0][..block.len()].copy_from_slice(&red[block.clone()]);
+        rgb[1][..block.len()].copy_from_slice(&green[block.clone()]);
+        rgb[2][..block.len()].copy_from_slice(&blue[block.clone()]);
+        let [l, a, b] = convert_planes(&rgb);
+        lightness[block.clone()].copy_from_slice(&l[..block.len()]);
+        a_star[block.clone()].copy_from_slice(&a[..block.len()]);
+        b_star[block.clone()].copy_from_slice(&b[..block.len()]);
+    }
+}
+
+#[inline(always)]
 fn convert(block: &[[f32; 3]; PIXELS]) -> [[f32; PIXELS]; 3] {
     let mut rgb = [[0.0; PIXELS]; 3];
     for i in 0..PIXELS {
@@ -111,6 +144,11 @@ fn convert(block: &[[f32; 3]; PIXELS]) -> [[f32; PIXELS]; 3] {
         rgb[1][i] = block[i][1];
         rgb[2][i] = block[i][2];
     }
+    convert_planes(&rgb)
+}
+
+#[inline(always)]
+fn convert_planes(rgb: &[[f32; PIXELS]; 3]) -> [[f32; PIXELS]; 3] {
     let mut lab = [[0.0; PIXELS]; 3];
     for i in 0..PIXELS {
         let relative = |row: [f32; 3]| row[0] * rgb[0][i] + row[1] * rgb[1][i] + row[2] * rgb[2][i];

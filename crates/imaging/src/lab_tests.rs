@@ -106,3 +106,14 @@ proptest! {
         prop_assert!((weighted_squared_distance(&a, &b, w) - exact).abs() <= 1e-6 * exact);
     }
 }
+
+#[test]
+fn planes_and_pixels_give_the_same_bits() {
+    let pixels: Vec<[f32; 3]> =
+        (0..1003).map(|i| [i as f32 * 0.01, (i % 17) as f32, (i % 5) as f32 * 0.2]).collect();
+    let plane = |c: usize| pixels.iter().map(|p| p[c]).collect::<Vec<f32>>();
+    let (mut a, mut b) = (vec![0.0; 3009], vec![0.0; 3009]);
+    lab_planes(&pixels, &mut a);
+    lab_planes_of([&plane(0), &plane(1), &plane(2)], &mut b);
+    assert!(a == b);
+}

@@ -20,7 +20,7 @@ pub use error::ImageError;
 pub use false_colour::error_map;
 pub use file::{MAX_PIXELS, decode, read, write};
 pub use image::Image;
-pub use lab::{lab_planes, squared_distance, weighted_squared_distance};
+pub use lab::{lab_planes, lab_planes_of, squared_distance, weighted_squared_distance};
 pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
 pub use metrics::mask::{Mask, disc_weight};
 pub use metrics::nrmsd::{nrmsd, nrmsd_pixels};

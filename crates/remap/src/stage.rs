@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lookmatch_imaging::{Fitness, Reduce, Space, lab_planes, squared_distance, weighted_squared_distance};
+use lookmatch_imaging::{
+    Fitness, Reduce, Space, lab_planes, lab_planes_of, squared_distance, weighted_squared_distance,
+};
 use lookmatch_materials::{Bsdf, Material};
-use lookmatch_rendering::{Illumination, Part, Renderer};
+use lookmatch_rendering::{Illumination, Lobes, Part, Planes, Renderer};
 use rayon::prelude::*;
 
 use crate::projection::{Projection, Sketches};
@@ -60,8 +62,14 @@ impl Stage {
     pub fn appearances(&self, materials: &[Material]) -> Vec<Appearance> {
         let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
         let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
+        let lobes = Lobes::new(&bsdfs);
         let lab = |renderer: &Renderer| -> Vec<Vec<f32>> {
-            renderer.specular_batch(&bsdfs).par_iter().map(|pixels| planes(pixels)).collect()
+            let lab = |[r, g, b]: &Planes| {
+                let mut lab = vec![0.0; 3 * r.len()];
+                lab_planes_of([r, g, b], &mut lab);
+                lab
+            };
+            renderer.specular_planes(&lobes).par_iter().map(lab).collect()
         };
         let pairs = lab(&self.point).into_iter().zip(lab(&self.environment));
         pairs.map(|(point, environment)| Appearance { point, environment }).collect()
@@ -124,10 +132,12 @@ impl Stage {
     ) -> [Sketches; 2] {
         let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
         let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
+        let lobes = Lobes::new(&bsdfs);
         let sketch = |renderer: &Renderer, projection: &Projection| {
-            let images = renderer.specular_batch(&bsdfs);
+            let images = renderer.specular_planes(&lobes);
             projection.project(images.len(), &|image, pixels, planes| {
-                lab_planes(&images[image][pixels], planes);
+                let [r, g, b] = &images[image];
+                lab_planes_of([&r[pixels.clone()], &g[pixels.clone()], &b[pixels]], planes);
             })
         };
         [sketch(&self.point, point), sketch(&self.environment, environment)]

@@ -28,6 +28,7 @@ mod grid;
 mod highlights;
 mod irradiance;
 mod lobe_table;
+mod lobes;
 mod mesh;
 mod path_tracer;
 mod plane;
@@ -35,6 +36,7 @@ mod product;
 mod pyramid;
 mod render;
 mod renderer;
+mod returned;
 mod rings;
 mod rows;
 mod sampling;
@@ -44,10 +46,12 @@ mod transport;
 pub use designed_map::designed_map;
 pub use environment::EnvironmentMap;
 pub use error::SceneError;
+pub use lobes::Lobes;
 pub use path_tracer::PathTracer;
 pub use render::{RENDERERS, Render, RendererEntry};
 pub use renderer::{Part, Renderer};
 pub use scene::{Camera, EnvironmentLight, Illumination, Mesh, Plane, PointLight, Scene, Sphere};
+pub use transport::Planes;
 
 /// A linear RGB value in the first three lanes.
 pub(crate) type Rgb = glam::Vec4;

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use lookmatch_materials::{Bsdf, Geometry};
 
 use crate::rings::{NODES, ROW, Ring, TERMS, chebyshev, node, project};
@@ -65,16 +66,29 @@ impl LobeTable {
     pub(crate) fn at(&self, theta: f64) -> Coefficients {
         let x = (theta / spacing()).clamp(0.0, (ANGLES - 1) as f64);
         let first = (x as usize).saturating_sub(1).min(ANGLES - 4);
-        let weights = cubic(x - first as f64);
+        let weights = cubic(x - first as f64).map(|w| w as f32);
         let mut blended = [[0.0; 3]; ROW];
-        for (weight, row) in weights.iter().zip(&self.angles[first..first + 4]) {
-            for (sum, c) in blended.as_flattened_mut().iter_mut().zip(row.as_flattened()) {
-                *sum += *weight as f32 * c;
-            }
-        }
+        let level = Level::new();
+        dispatch!(level, simd => blend(simd, &self.angles[first..first + 4], weights, blended.as_flattened_mut()));
         blended
     }
 }
+
+/// The weighted sum of four rows of coefficients.
+#[inline(always)]
+fn blend<S: Simd>(simd: S, rows: &[Coefficients], weights: [f32; 4], out: &mut [f32]) {
+    let width = S::f32s::LEN;
+    for start in (0..3 * ROW).step_by(width) {
+        let lanes = start..start + width;
+        let mut sum = S::f32s::splat(simd, 0.0);
+        for (row, weight) in rows.iter().zip(weights) {
+            sum = S::f32s::from_slice(simd, &row.as_flattened()[lanes.clone()]).mul_add(weight, sum);
+        }
+        sum.store_slice(&mut out[lanes]);
+    }
+}
+
+const _: () = assert!((3 * ROW).is_multiple_of(16), "rows fill the registers of every instruction set");
 
 /// The mean of an anisotropic lobe over turns about the normal.
 fn averaged(bsdf: &dyn Bsdf, geometries: &[Geometry<f32>]) -> Vec<[f32; 3]> {

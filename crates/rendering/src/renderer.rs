@@ -14,9 +14,11 @@ use crate::gather;
 use crate::highlights::Highlights;
 use crate::irradiance::Place;
 use crate::lobe_table::LobeTable;
+use crate::lobes::{Expanded, Lobes};
+use crate::returned::{Returned, ReturnedLight};
 use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
-use crate::transport::{Lobe, Transport};
+use crate::transport::{Lobe, Planes, Transport};
 use crate::{Rgb, SceneError, rgb};
 
 #[cfg(test)]
@@ -42,7 +44,7 @@ pub struct Renderer {
     /// Indices of the subject pixels, by angle of view.
     subjects: Vec<u32>,
     rows: Rows,
-    diffuse: Vec<DiffuseLight>,
+    returned: Returned,
     /// The interreflection between subjects and checkerboard, …
     bounce: Option<Bounce>,
     /// … and, for pixels that see the checkerboard, what it sends there of an irradiance in each mode.
@@ -86,7 +88,7 @@ impl Renderer {
         let rows = Rows::new(&field, &film, &pixels);
         let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
         let bounce = Bounce::prepare(scene, &field);
-        let diffuse = subjects
+        let diffuse: Vec<DiffuseLight> = subjects
             .par_iter()
             .map(|p| diffuse_light(scene, &field, &film, bounce.as_ref(), *p as usize))
             .collect();
@@ -99,7 +101,7 @@ impl Renderer {
             background,
             subjects,
             rows,
-            diffuse,
+            returned: returned(&diffuse),
             bounce,
             board,
             highlights,
@@ -123,16 +125,16 @@ impl Renderer {
     pub fn render_batch(&self, materials: &[&Material], part: Part) -> Vec<Image> {
         let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(|m| m.bsdf()).collect();
         let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
-        let specular = match part {
-            Part::Full => self.specular_batch(&bsdfs),
-            Part::DiffuseOnly => vec![vec![[0.0; 3]; self.subjects.len()]; materials.len()],
+        let lobes = match part {
+            Part::Full => Lobes::new(&bsdfs),
+            Part::DiffuseOnly => Lobes::without_lobes(&bsdfs),
         };
         let weights = |bsdf: &&dyn Bsdf| match part {
             Part::Full => self.weights(*bsdf),
             Part::DiffuseOnly => self.diffuse_weights(bsdf.diffuse()),
         };
-        let images = materials.iter().zip(&bsdfs).zip(&specular);
-        images.map(|((m, bsdf), s)| self.developed(&self.diffuse_pixels(m), s, &weights(bsdf))).collect()
+        let planes = self.subject_planes(&lobes);
+        planes.iter().zip(&bsdfs).map(|(planes, bsdf)| self.developed(planes, &weights(bsdf))).collect()
     }
 
     /// The irradiance that a material adds to the checkerboard.
@@ -147,14 +149,14 @@ impl Renderer {
     }
 
     /// The background with the subject pixels laid over it.
-    fn developed(&self, diffuse: &[[f32; 3]], specular: &[[f32; 3]], weights: &Weights) -> Image {
+    fn developed(&self, planes: &Planes, weights: &Weights) -> Image {
         let mut image = Image::new(self.film.size, self.film.size);
         for (out, b) in image.pixels_mut().iter_mut().zip(&self.background) {
             *out = [b.x, b.y, b.z];
         }
         for (k, pixel) in self.subjects.iter().enumerate() {
             let out = &mut image.pixels_mut()[*pixel as usize];
-            (0..3).for_each(|c| out[c] += diffuse[k][c] + specular[k][c]);
+            (0..3).for_each(|c| out[c] += planes[c][k]);
         }
         for (pixel, modes) in &self.board {
             let out = &mut image.pixels_mut()[*pixel as usize];
@@ -183,79 +185,79 @@ impl Renderer {
         self.specular_batch(&[bsdf]).swap_remove(0)
     }
 
-    /// [`Renderer::specular_pixels`] of several materials at once, in their order: the prepared light is read once for all.
+    /// [`Renderer::specular_pixels`] of several materials at once, in their order.
     pub fn specular_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
-        let shiny: Vec<usize> = (0..bsdfs.len()).filter(|i| bsdfs[*i].sampling().is_some()).collect();
-        let mut images = vec![vec![[0.0; 3]; self.subjects.len()]; bsdfs.len()];
-        let lobes: Vec<&dyn Bsdf> = shiny.iter().map(|i| bsdfs[*i]).collect();
-        for (i, image) in shiny.into_iter().zip(self.lobe_batch(&lobes)) {
-            images[i] = image;
-        }
-        images
+        let interleaved =
+            |[r, g, b]: Planes| r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
+        self.specular_planes(&Lobes::new(bsdfs)).into_par_iter().map(interleaved).collect()
     }
 
-    /// Lobes through the ring transport.
-    fn lobe_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
-        if bsdfs.is_empty() {
-            return Vec::new();
-        }
-        let lobes: Vec<Lobe> = bsdfs.par_iter().map(|b| self.lobe(*b)).collect();
-        let images = match &self.transport {
-            Some(transport) => transport.radiance(&lobes),
+    /// What some lobes add to each subject pixel, for each material as planes of linear red, green and blue: the prepared
+    /// light is read once for all.
+    pub fn specular_planes(&self, lobes: &Lobes) -> Vec<Planes> {
+        self.planes(lobes, false)
+    }
+
+    /// All that each subject pixel shows of some materials, as [`Renderer::specular_planes`].
+    pub fn subject_planes(&self, lobes: &Lobes) -> Vec<Planes> {
+        self.planes(lobes, true)
+    }
+
+    /// The planes of some materials: everything, or only what the lobes add to the diffuse part.
+    fn planes(&self, lobes: &Lobes, whole: bool) -> Vec<Planes> {
+        let materials = lobes.bsdfs.par_iter().zip(&lobes.expanded);
+        let waiting: Vec<Option<Lobe>> =
+            materials.clone().map(|(b, e)| Some(self.lobe(*b, e.as_ref()?))).collect();
+        let mut lit = self.lit(&waiting.iter().flatten().collect::<Vec<_>>()).into_iter();
+        let images: Vec<Option<Planes>> =
+            waiting.iter().map(|lobe| lobe.as_ref().and_then(|_| lit.next())).collect();
+        let finished = |(((bsdf, _), lobe), image): (((&&dyn Bsdf, _), &Option<Lobe>), Option<Planes>)| {
+            let mut planes = if whole { self.returned.baked(bsdf.diffuse()) } else { self.black() };
+            let mut weights = self.diffuse_weights(bsdf.diffuse());
+            if let (Some(image), Some(lobe)) = (image, lobe) {
+                add(&mut planes, &image);
+                self.add_lights(*bsdf, &mut planes);
+                weights = if whole { lobe.weights } else { difference(&lobe.weights, &weights) };
+            } else if !whole {
+                return planes;
+            }
+            self.returned.add(&weights, bsdf.diffuse(), &mut planes);
+            planes
+        };
+        materials.zip(&waiting).zip(images).map(finished).collect()
+    }
+
+    fn black(&self) -> Planes {
+        std::array::from_fn(|_| vec![0.0; self.subjects.len()])
+    }
+
+    fn lobe<'a>(&self, bsdf: &dyn Bsdf, expanded: &'a Expanded) -> Lobe<'a> {
+        let weights = |b: &Bounce| b.weights(Some(&expanded.bounce), bsdf.diffuse());
+        let weights = self.bounce.as_ref().map_or([[0.0; 3]; MODES], weights);
+        Lobe { weights, table: &expanded.table, is_isotropic: bsdf.is_isotropic() }
+    }
+
+    /// What the prepared light makes of lobes.
+    fn lit(&self, lobes: &[&Lobe]) -> Vec<Planes> {
+        match &self.transport {
+            _ if lobes.is_empty() => Vec::new(),
+            Some(transport) => transport.radiance(lobes),
             None => {
-                Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()).radiance(&lobes)
+                Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()).radiance(lobes)
             }
-        };
-        let image = |((mut image, bsdf), lobe): (([Vec<f32>; 3], &&dyn Bsdf), &Lobe)| {
-            self.add_diffuse_share(*bsdf, lobe, &mut image);
-            if lobe.is_isotropic {
-                self.highlights.add(*bsdf, &mut image);
-            } else {
-                self.add_directly(*bsdf, &mut image);
-            }
-            let [r, g, b] = image;
-            r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect()
-        };
-        images.into_par_iter().zip(bsdfs).zip(&lobes).map(image).collect()
-    }
-
-    fn lobe(&self, bsdf: &dyn Bsdf) -> Lobe {
-        let table = LobeTable::new(bsdf);
-        let weights = |b: &Bounce| b.weights(Some(&BounceLobe::new(&table)), bsdf.diffuse());
-        Lobe {
-            weights: self.bounce.as_ref().map_or([[0.0; 3]; MODES], weights),
-            table,
-            is_isotropic: bsdf.is_isotropic(),
         }
     }
 
-    /// Adds what the diffuse term reflects of the light that the lobe threw onto the checkerboard.
-    fn add_diffuse_share(&self, bsdf: &dyn Bsdf, lobe: &Lobe, image: &mut [Vec<f32>; 3]) {
-        let (albedo, without) = (bsdf.diffuse(), self.diffuse_weights(bsdf.diffuse()));
-        let more: Weights =
-            std::array::from_fn(|m| std::array::from_fn(|c| lobe.weights[m][c] - without[m][c]));
-        for (k, light) in self.diffuse.iter().enumerate() {
-            let added = light.added(&more, rgb(albedo));
-            (0..3).for_each(|c| image[c][k] += added[c]);
-        }
+    /// Adds what the rings leave out of a lobe: small lights, or all of a lobe that is not isotropic.
+    fn add_lights(&self, bsdf: &dyn Bsdf, planes: &mut Planes) {
+        if bsdf.is_isotropic() { self.highlights.add(bsdf, planes) } else { self.add_directly(bsdf, planes) }
     }
 
     /// Adds a lobe that is not isotropic through the direct integral.
-    fn add_directly(&self, bsdf: &dyn Bsdf, image: &mut [Vec<f32>; 3]) {
+    fn add_directly(&self, bsdf: &dyn Bsdf, image: &mut Planes) {
         for (k, pixel) in self.gathered_pixels(bsdf, gather::SAMPLES).into_iter().enumerate() {
             (0..3).for_each(|c| image[c][k] += pixel[c]);
         }
-    }
-
-    /// What the diffuse term adds to each subject pixel, linear RGB.
-    pub fn diffuse_pixels(&self, material: &Material) -> Vec<[f32; 3]> {
-        let albedo = rgb(material.bsdf().diffuse());
-        let weights = self.diffuse_weights(material.bsdf().diffuse());
-        let radiance = |d: &DiffuseLight| {
-            let sum = d.own + albedo * d.white + d.added(&weights, albedo);
-            [sum.x, sum.y, sum.z]
-        };
-        self.diffuse.iter().map(radiance).collect()
     }
 
     /// The direct integral of a lobe with a chosen number of samples: slow, and independent of the ring transport.
@@ -282,13 +284,26 @@ impl Scene {
     }
 }
 
-impl DiffuseLight {
-    /// What the pixel adds for an irradiance of the checkerboard.
-    fn added(&self, weights: &Weights, albedo: Rgb) -> Rgb {
-        let sum: Rgb =
-            self.modes.iter().zip(weights).map(|(m, [r, g, b])| Rgb::new(*r, *g, *b, 0.0) * *m).sum();
-        (self.own_share + albedo * self.white_share) * sum
+fn add(planes: &mut Planes, more: &Planes) {
+    for (plane, more) in planes.iter_mut().zip(more) {
+        plane.iter_mut().zip(more).for_each(|(sum, v)| *sum += v);
     }
+}
+
+fn difference(a: &Weights, b: &Weights) -> Weights {
+    std::array::from_fn(|m| std::array::from_fn(|c| a[m][c] - b[m][c]))
+}
+
+/// What the diffuse term reflects of irradiance on the checkerboard.
+fn returned(diffuse: &[DiffuseLight]) -> Returned {
+    let rgb = |v: Rgb| [v.x, v.y, v.z];
+    Returned::new(diffuse.iter().map(|d| ReturnedLight {
+        own: rgb(d.own),
+        white: rgb(d.white),
+        own_share: rgb(d.own_share),
+        white_share: d.white_share,
+        modes: d.modes,
+    }))
 }
 
 /// What pixels see of the checkerboard for an irradiance in each mode.

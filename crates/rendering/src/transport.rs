@@ -46,9 +46,12 @@ struct Bundle {
     reflected: Option<Box<Reflected>>,
 }
 
+/// Pictures of the subject pixels: planes of linear red, green and blue.
+pub type Planes = [Vec<f32>; 3];
+
 /// A lobe on its way to a picture.
-pub(crate) struct Lobe {
-    pub(crate) table: LobeTable,
+pub(crate) struct Lobe<'a> {
+    pub(crate) table: &'a LobeTable,
     /// What its material adds to the irradiance of the checkerboard.
     pub(crate) weights: Weights,
     /// False where the rings cannot hold the lobe itself, but only its mean, for interreflection.
@@ -74,7 +77,7 @@ impl Transport {
 
     /// The radiance of all rows' pixels through some lobes, each with the irradiance that its material adds to the
     /// checkerboard: for each lobe three planes, one for each channel.
-    pub(crate) fn radiance(&self, lobes: &[Lobe]) -> Vec<[Vec<f32>; 3]> {
+    pub(crate) fn radiance(&self, lobes: &[&Lobe]) -> Vec<Planes> {
         let mut images = planes(&self.main, lobes);
         let more = planes(&self.more, lobes);
         images.par_iter_mut().zip(more).for_each(|(image, more)| {
@@ -100,7 +103,7 @@ fn bundled(rows: &[Row]) -> Vec<&[Row]> {
 }
 
 /// The products of all bundles with all lobes.
-fn planes(bundles: &[Bundle], lobes: &[Lobe]) -> Vec<[Vec<f32>; 3]> {
+fn planes(bundles: &[Bundle], lobes: &[&Lobe]) -> Vec<Planes> {
     let blocks: Vec<Vec<[Lanes; 3]>> =
         bundles.par_chunks(BLOCK).map(|bundles| block(bundles, lobes)).collect();
     let plane = |m: usize, c: usize| -> Vec<f32> {
@@ -113,7 +116,7 @@ fn planes(bundles: &[Bundle], lobes: &[Lobe]) -> Vec<[Vec<f32>; 3]> {
 }
 
 /// The products of some bundles with all lobes, lobe by lobe for each bundle.
-fn block(bundles: &[Bundle], lobes: &[Lobe]) -> Vec<[Lanes; 3]> {
+fn block(bundles: &[Bundle], lobes: &[&Lobe]) -> Vec<[Lanes; 3]> {
     let mut products = vec![[[0.0; LANES]; 3]; bundles.len() * lobes.len()];
     let mut coefficients = Vec::new();
     let mut theta = f64::NAN;

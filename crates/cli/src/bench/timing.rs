@@ -6,7 +6,7 @@ use anyhow::Context;
 use cpu_time::ThreadTime;
 use lookmatch_imaging::{FitnessWeights, lab_planes, squared_distance};
 use lookmatch_materials::{Bsdf, Material};
-use lookmatch_rendering::{Part, Renderer};
+use lookmatch_rendering::{Lobes, Part, Renderer};
 use serde::Serialize;
 
 use super::materials::{batch, of_all_widths};
@@ -65,8 +65,12 @@ fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> anyhow::Result<T> 
 
 /// The cost per material of pictures by all of some renderers; each run has a batch.
 fn cost(renderers: &[&Renderer], batches: &[Vec<Material>]) -> PictureCost {
+    // From materials to everything that the subject's pixels hold, linear RGB.
     let render = |materials: &[Material]| {
-        renderers.iter().for_each(|renderer| drop(black_box(pictures(renderer, materials))));
+        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
+        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
+        let lobes = Lobes::new(&bsdfs);
+        renderers.iter().for_each(|renderer| drop(black_box(renderer.subject_planes(&lobes))));
     };
     let each = |milliseconds: f64| milliseconds / batches[0].len() as f64;
     PictureCost {
@@ -83,19 +87,6 @@ fn fastest(runs: usize, mut work: impl FnMut(usize)) -> f64 {
         1e3 * start.elapsed().as_secs_f64()
     });
     milliseconds.fold(f64::INFINITY, f64::min)
-}
-
-/// Everything that the subject's pixels hold, linear RGB: from materials to pictures.
-fn pictures(renderer: &Renderer, materials: &[Material]) -> Vec<Vec<[f32; 3]>> {
-    let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
-    let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
-    let mut pictures = renderer.specular_batch(&bsdfs);
-    for (material, picture) in materials.iter().zip(&mut pictures) {
-        for (pixel, diffuse) in picture.iter_mut().zip(renderer.diffuse_pixels(material)) {
-            (0..3).for_each(|c| pixel[c] += diffuse[c]);
-        }
-    }
-    pictures
 }
 
 /// Diffuse and specular pictures under both lights, in the order of [`equation_3`]'s terms.

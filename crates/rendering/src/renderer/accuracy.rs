@@ -26,9 +26,9 @@ fn thinned(scene: &Scene, renderer: Renderer, pixels: &[u32]) -> Renderer {
     let rows = Rows::new(field, film, pixels);
     let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
     let light = |p: &u32| diffuse_light(scene, field, film, renderer.bounce.as_ref(), *p as usize);
-    let diffuse = subjects.iter().map(light).collect();
+    let diffuse: Vec<DiffuseLight> = subjects.iter().map(light).collect();
     let highlights = Highlights::prepare(field, film, &subjects);
-    Renderer { subjects, rows, diffuse, highlights, ..renderer }.keep_transport()
+    Renderer { subjects, rows, returned: returned(&diffuse), highlights, ..renderer }.keep_transport()
 }
 
 /// Prints and checks the mean ΔE*76 of materials, each with the most that is accepted.
