@@ -6,8 +6,15 @@ use std::process::{Command, Output};
 use serde_json::Value as Json;
 use tempfile::TempDir;
 
+/// The program in a folder; it keeps no light, so that no test sees what another program prepared.
+fn program(folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookmatch"));
+    command.current_dir(folder).env("LOOKMATCH_CACHE", "off");
+    command
+}
+
 fn lookmatch(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lookmatch")).current_dir(folder).args(arguments).output().unwrap()
+    program(folder).args(arguments).output().unwrap()
 }
 
 /// Runs a command that must succeed and print one JSON document.
@@ -81,8 +88,7 @@ fn vectors_are_evaluated_and_unknown_models_are_null() {
 fn a_picture_is_the_same_on_any_number_of_threads() {
     let folder = TempDir::new().unwrap();
     for (threads, name) in [("1", "one.exr"), ("3", "three.exr")] {
-        let status = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
-            .current_dir(&folder)
+        let status = program(folder.path())
             .env("RAYON_NUM_THREADS", threads)
             .args(["render", "reference", "--material", "ggx:ior=1.6,roughness=0.1", "--light", "env"])
             .args(["--size", "24", "-o", name])
@@ -201,8 +207,7 @@ fn an_interrupted_remap_goes_on_where_it_stopped() {
         "--fix",
         "roughness=0.2",
     ];
-    let mut child = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
-        .current_dir(&folder)
+    let mut child = program(folder.path())
         .args(with(&job, &["-o", "p.json"]))
         .stderr(std::process::Stdio::null())
         .spawn()

@@ -1,6 +1,8 @@
 //! The built-in renderer: a scene prepared for one illumination, and pictures of materials in it.
 
 use std::f32::consts::PI;
+use std::io;
+use std::sync::LazyLock;
 
 use lookmatch_imaging::{Image, Mask};
 use lookmatch_materials::{Bsdf, Material, Role};
@@ -8,14 +10,17 @@ use rayon::prelude::*;
 
 use crate::bodies::Body;
 use crate::bounce::{Bounce, BounceLobe, MODES, Weights};
+use crate::cache::{Observe, Progress, TransportCache};
 use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES, SurfacePoint};
+use crate::flat::{Flat, Reader, Writer};
 use crate::gather;
 use crate::highlights::Highlights;
 use crate::irradiance::Place;
 use crate::lobe_table::LobeTable;
 use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
+use crate::source::Source;
 use crate::transport::{Lobe, Transport};
 use crate::{Rgb, SceneError, rgb};
 
@@ -31,16 +36,24 @@ pub enum Part {
     DiffuseOnly,
 }
 
+/// The light of the scene. Where the transport was read, it is baked when it is first needed: only lobes that are not
+/// isotropic look it up.
+type LazyField = LazyLock<Field, Box<dyn FnOnce() -> Field + Send + Sync>>;
+
+/// The share of preparing a scene that is done when gathering its transport starts, about.
+const PREPARED: f64 = 0.2;
+
 /// A scene prepared for one illumination and picture size.
 ///
 /// Subject pixels are those that see a sphere; everything else is the same in every picture.
 pub struct Renderer {
-    field: Field,
+    field: LazyField,
     film: Film,
     /// What is seen beside the subjects, for every pixel.
     background: Vec<Rgb>,
     /// Indices of the subject pixels, by angle of view.
     subjects: Vec<u32>,
+    /// Empty where the transport was read: it is made of them.
     rows: Rows,
     diffuse: Vec<DiffuseLight>,
     /// The interreflection between subjects and checkerboard, …
@@ -67,6 +80,9 @@ struct DiffuseLight {
     modes: [f32; MODES],
 }
 
+/// A [`DiffuseLight`] without gaps.
+type Numbers = [f32; 13 + MODES];
+
 impl Renderer {
     /// Prepares a scene for pictures of `size` × `size` pixels (1 to 8192).
     ///
@@ -75,12 +91,36 @@ impl Renderer {
     /// # Errors
     /// Where the scene lacks the light that is asked for, or its environment map cannot be read.
     pub fn prepare(scene: &Scene, illumination: Illumination, size: usize) -> Result<Self, SceneError> {
-        scene.check_picture(illumination, size)?;
-        if !scene.meshes.is_empty() {
-            return Err(SceneError::NeedsPath { scene: scene.name.clone() });
-        }
-        let field = Field::bake(scene, illumination)?;
-        let film = Film::new(&scene.camera, size);
+        Self::prepare_source(&Source::new(scene, illumination, size)?)
+    }
+
+    /// [`Renderer::prepare`] and [`Renderer::keep_transport`], or the same read from a cache. `observe` is told what happens;
+    /// it is not to be called by several jobs of one thread pool at once, which might wait for each other.
+    ///
+    /// # Errors
+    /// As [`Renderer::prepare`]: a cache that does not work is only warned of.
+    pub fn cached(
+        scene: &Scene,
+        illumination: Illumination,
+        size: usize,
+        cache: &TransportCache,
+        observe: Observe,
+    ) -> Result<Self, SceneError> {
+        cache.renderer(&Source::new(scene, illumination, size)?, observe)
+    }
+
+    /// Prepares a scene and its transport.
+    pub(crate) fn build(source: &Source, observe: Observe) -> Result<Self, SceneError> {
+        observe(Progress::Preparing(0.0));
+        let renderer = Self::prepare_source(source)?;
+        let share = |share| observe(Progress::Preparing(PREPARED + (1.0 - PREPARED) * share));
+        share(0.0);
+        Ok(renderer.keep_transport_observed(&share))
+    }
+
+    fn prepare_source(source: &Source) -> Result<Self, SceneError> {
+        let (scene, field) = (&source.scene, source.bake()?);
+        let film = Film::new(&scene.camera, source.size);
         let (background, hits) = look(&field, &film);
         let pixels: Vec<u32> = (0..hits.len() as u32).filter(|i| hits[*i as usize]).collect();
         let rows = Rows::new(&field, &film, &pixels);
@@ -94,7 +134,7 @@ impl Renderer {
         let highlights = Highlights::prepare(&field, &film, &subjects);
         let mask = subject_mask(scene, &film)?;
         Ok(Self {
-            field,
+            field: LazyLock::new(Box::new(|| field)),
             film,
             background,
             subjects,
@@ -109,9 +149,19 @@ impl Renderer {
     }
 
     /// Keeps the ring transport for all further pictures: about 1 KB per subject pixel.
-    pub fn keep_transport(mut self) -> Self {
-        self.transport = Some(Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()));
+    pub fn keep_transport(self) -> Self {
+        self.keep_transport_observed(&|_| ())
+    }
+
+    fn keep_transport_observed(mut self, observe: &(dyn Fn(f64) + Sync)) -> Self {
+        if self.transport.is_none() {
+            self.transport = Some(self.gathered(observe));
+        }
         self
+    }
+
+    fn gathered(&self, observe: &(dyn Fn(f64) + Sync)) -> Transport {
+        Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref(), observe)
     }
 
     /// A picture of a material, linear RGB, row 0 on top.
@@ -202,9 +252,7 @@ impl Renderer {
         let lobes: Vec<Lobe> = bsdfs.par_iter().map(|b| self.lobe(*b)).collect();
         let images = match &self.transport {
             Some(transport) => transport.radiance(&lobes),
-            None => {
-                Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()).radiance(&lobes)
-            }
+            None => self.gathered(&|_| ()).radiance(&lobes),
         };
         let image = |((mut image, bsdf), lobe): (([Vec<f32>; 3], &&dyn Bsdf), &Lobe)| {
             self.add_diffuse_share(*bsdf, lobe, &mut image);
@@ -269,6 +317,42 @@ impl Renderer {
     }
 }
 
+impl Renderer {
+    /// Writes what costs time to prepare.
+    pub(crate) fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.slice(&self.background)?;
+        out.slice(&self.subjects)?;
+        out.slice(&self.diffuse.iter().map(DiffuseLight::numbers).collect::<Vec<_>>())?;
+        self.bounce.write(out)?;
+        let (pixels, modes): (Vec<u32>, Vec<[f32; MODES]>) = self.board.iter().copied().unzip();
+        out.slice(&pixels)?;
+        out.slice(&modes)?;
+        self.highlights.write(out)?;
+        self.transport.write(out)
+    }
+
+    /// Reads what was written for the same source.
+    pub(crate) fn read(source: &Source, input: &mut Reader) -> io::Result<Self> {
+        let film = Film::new(&source.scene.camera, source.size);
+        let mask = subject_mask(&source.scene, &film).map_err(io::Error::other)?;
+        let source = source.clone();
+        let bake = move || source.bake().expect("the light was baked before it was kept");
+        Ok(Self {
+            field: LazyLock::new(Box::new(bake)),
+            film,
+            background: input.vec()?,
+            subjects: input.vec()?,
+            rows: Rows::default(),
+            diffuse: input.vec()?.into_iter().map(DiffuseLight::from_numbers).collect(),
+            bounce: Flat::read(input)?,
+            board: input.vec()?.into_iter().zip(input.vec()?).collect(),
+            highlights: Flat::read(input)?,
+            transport: Flat::read(input)?,
+            mask,
+        })
+    }
+}
+
 impl Scene {
     /// The scene as materials of a model see it: without diffuse colours of the subjects where the model has no diffuse
     /// reflectance.
@@ -283,6 +367,26 @@ impl Scene {
 }
 
 impl DiffuseLight {
+    fn numbers(&self) -> Numbers {
+        let mut numbers = [0.0; 13 + MODES];
+        let colours = [self.own, self.white, self.own_share];
+        numbers[..12].copy_from_slice(colours.map(|c| c.to_array()).as_flattened());
+        numbers[12] = self.white_share;
+        numbers[13..].copy_from_slice(&self.modes);
+        numbers
+    }
+
+    fn from_numbers(numbers: Numbers) -> Self {
+        let colour = |i: usize| Rgb::from_slice(&numbers[4 * i..4 * i + 4]);
+        Self {
+            own: colour(0),
+            white: colour(1),
+            own_share: colour(2),
+            white_share: numbers[12],
+            modes: std::array::from_fn(|m| numbers[13 + m]),
+        }
+    }
+
     /// What the pixel adds for an irradiance of the checkerboard.
     fn added(&self, weights: &Weights, albedo: Rgb) -> Rgb {
         let sum: Rgb =
