@@ -8,6 +8,7 @@ mod bench;
 mod commands;
 mod output;
 mod report;
+mod transport;
 
 use std::process::ExitCode;
 

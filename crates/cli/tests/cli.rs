@@ -1,13 +1,20 @@
 //! What a user does at the command line, and what the program says when it cannot be done.
 
-use std::path::Path;
-use std::process::{Command, Output};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value as Json;
 use tempfile::TempDir;
 
+/// The program in a folder; it keeps no light, so that no test sees what another program prepared.
+fn program(folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookmatch"));
+    command.current_dir(folder).env("LOOKMATCH_CACHE", "off");
+    command
+}
+
 fn lookmatch(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lookmatch")).current_dir(folder).args(arguments).output().unwrap()
+    program(folder).args(arguments).output().unwrap()
 }
 
 /// Runs a command that must succeed and print one JSON document.
@@ -81,8 +88,7 @@ fn vectors_are_evaluated_and_unknown_models_are_null() {
 fn a_picture_is_the_same_on_any_number_of_threads() {
     let folder = TempDir::new().unwrap();
     for (threads, name) in [("1", "one.exr"), ("3", "three.exr")] {
-        let status = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
-            .current_dir(&folder)
+        let status = program(folder.path())
             .env("RAYON_NUM_THREADS", threads)
             .args(["render", "reference", "--material", "ggx:ior=1.6,roughness=0.1", "--light", "env"])
             .args(["--size", "24", "-o", name])
@@ -116,6 +122,56 @@ fn a_picture_is_traced() {
     refused(folder.path(), &render(&["--renderer", "raster"]), 2, &["'raster'", "transport", "path"]);
     refused(folder.path(), &render(&["--renderer", "path", "--samples", "0"]), 1, &["0 samples", "1048576"]);
     assert!(!folder.path().join("o.exr").exists());
+}
+
+#[test]
+fn light_is_prepared_once_and_kept() {
+    let folder = TempDir::new().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = program(folder.path());
+        command
+            .env("LOOKMATCH_CACHE", folder.path().join("kept"))
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command.spawn().unwrap()
+    };
+    let render = |output: &str| {
+        let material = ["render", "reference", "-m", "ggx:roughness=0.1", "-l", "point", "--size", "16"];
+        run(&[&material[..], &["-o", output, "--json"]].concat())
+    };
+    let transport = |child: Child| {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success());
+        let summary: Json = serde_json::from_slice(&output.stdout).unwrap();
+        (summary["transport"].as_str().unwrap().to_owned(), String::from_utf8(output.stderr).unwrap())
+    };
+    let read = |name: &str| lookmatch_imaging::read(&folder.path().join(name)).unwrap();
+    let both = [render("a.exr"), render("b.exr")].map(|child| transport(child).0);
+    assert!(
+        both == ["built", "cached"] || both == ["cached", "built"],
+        "of two at once, one builds: {both:?}"
+    );
+    assert_eq!(read("a.exr"), read("b.exr"));
+
+    let [file] = kept(&folder.path().join("kept")).try_into().unwrap();
+    let mut bytes = std::fs::read(&file).unwrap();
+    bytes[1000] ^= 1;
+    std::fs::write(&file, bytes).unwrap();
+    let (how, told) = transport(render("c.exr"));
+    assert!(how == "built" && told.contains("warning") && told.contains(file.to_str().unwrap()), "{told}");
+    assert_eq!(transport(render("c.exr")).0, "cached");
+    assert_eq!(read("a.exr"), read("c.exr"));
+
+    // A comparison needs the same light.
+    let pair = ["compare", "--source", "ggx", "--target", "ggx:ior=1.6", "--scene", "reference"];
+    let pair = [&pair[..], &["--light", "point", "--size", "16", "-o", "pair"]].concat();
+    assert!(run(&pair).wait().unwrap().success());
+    assert_eq!(kept(&folder.path().join("kept")), [file]);
+}
+
+fn kept(folder: &Path) -> Vec<PathBuf> {
+    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
 }
 
 #[test]
@@ -201,12 +257,8 @@ fn an_interrupted_remap_goes_on_where_it_stopped() {
         "--fix",
         "roughness=0.2",
     ];
-    let mut child = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
-        .current_dir(&folder)
-        .args(with(&job, &["-o", "p.json"]))
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child =
+        program(folder.path()).args(with(&job, &["-o", "p.json"])).stderr(Stdio::null()).spawn().unwrap();
     let state = folder.path().join("p.json.partial");
     let lines = || std::fs::read_to_string(&state).map_or(0, |text| text.lines().count());
     while lines() < 3 && child.try_wait().unwrap().is_none() {
@@ -404,8 +456,7 @@ fn bad_benchmarks_are_refused() {
     refused(of, &["bench", "--quick", "-o", "no/performance.md"], 1, &["no folder"]);
     std::fs::write(of.join("file"), "").unwrap();
     refused(of, &["bench", "--quick", "--peer", "mitsuba", "--peer-folder", "file/x"], 1, &["file/x"]);
-    let output = Command::new(env!("CARGO_BIN_EXE_lookmatch"))
-        .current_dir(of)
+    let output = program(of)
         .env("PATH", "")
         .args(["bench", "--quick", "--peer", "mitsuba", "--peer-folder", "peer"])
         .output()

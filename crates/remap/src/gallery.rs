@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-use lookmatch_materials::{Material, Parameter, Role, Value};
+use lookmatch_materials::{Material, Value};
 use lookmatch_search::{Objective, ObjectiveError, Point};
 use lru::LruCache;
 
@@ -14,20 +14,20 @@ use crate::{Plan, RemapError};
 /// Memory for kept appearances, in bytes.
 const CAPACITY: usize = 500 << 20;
 
-/// What a specular appearance depends on: the bits of every value but the diffuse reflectance; empty without a lobe.
+/// What a specular appearance depends on: the bits of every value; empty without a lobe. The diffuse reflectance is among
+/// them: what it throws onto the checkerboard is seen in the lobe.
 pub(crate) type Key = Vec<u64>;
 
 pub(crate) fn key(material: &Material) -> Key {
     if material.bsdf().sampling().is_none() {
         return Key::new();
     }
-    let bits = |(parameter, value): (&Parameter, &Value)| match value {
-        _ if parameter.role == Role::DiffuseReflectance => Vec::new(),
+    let bits = |value: &Value| match value {
         Value::Number(v) => vec![v.to_bits()],
         Value::Colour(c) => c.map(f64::to_bits).to_vec(),
         Value::Choice(name) => name.bytes().map(u64::from).collect(),
     };
-    material.model().parameters.iter().zip(material.values()).flat_map(bits).collect()
+    material.values().iter().flat_map(bits).collect()
 }
 
 /// The most recently used target appearances.

@@ -7,7 +7,7 @@ use lookmatch_imaging::{
     Fitness, Reduce, Space, lab_planes, lab_planes_of, squared_distance, weighted_squared_distance,
 };
 use lookmatch_materials::{Bsdf, Material};
-use lookmatch_rendering::{Illumination, Lobes, Part, Planes, Renderer};
+use lookmatch_rendering::{Illumination, Lobes, Observe, Part, Planes, Progress, Renderer, TransportCache};
 use rayon::prelude::*;
 
 use crate::projection::{Projection, Sketches};
@@ -41,12 +41,26 @@ impl Stage {
     /// Where the scene cannot be rendered, or the metric is not one that this fast path evaluates (CIELAB, root mean
     /// square).
     pub fn prepare(plan: &Plan) -> Result<Self, RemapError> {
+        Self::cached(plan, &TransportCache::off(), &|_| ())
+    }
+
+    /// [`Stage::prepare`] with light that is kept in a cache; see [`Renderer::cached`].
+    ///
+    /// # Errors
+    /// As [`Stage::prepare`].
+    pub fn cached(plan: &Plan, cache: &TransportCache, observe: Observe) -> Result<Self, RemapError> {
         if plan.metric.space != Space::Lab || plan.metric.reduce != Reduce::Rms {
             return Err(RemapError::Option("a remap compares in CIELAB by the root mean square".into()));
         }
-        let prepare = |light| Renderer::prepare(&plan.scene, light, plan.size).map(Renderer::keep_transport);
-        let point = prepare(Illumination::Point)?;
-        let environment = prepare(Illumination::Environment)?;
+        let prepare = |before: f64, light| {
+            let of_both = |progress| match progress {
+                Progress::Preparing(share) => observe(Progress::Preparing(before + share / 2.0)),
+                other => observe(other),
+            };
+            Renderer::cached(&plan.scene, light, plan.size, cache, &of_both)
+        };
+        let point = prepare(0.0, Illumination::Point)?;
+        let environment = prepare(0.5, Illumination::Environment)?;
         let on_subject = |weights: &[f32]| point.subjects().iter().map(|i| weights[*i as usize]).collect();
         let weights = plan.mask.then(|| on_subject(point.mask().weights()));
         let diffuse = Mutex::new(HashMap::new());

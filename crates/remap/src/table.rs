@@ -303,7 +303,7 @@ fn stopped() -> RemapError {
 fn targets_are_shared(plan: &Plan) -> Result<bool, RemapError> {
     for axis in &plan.source_axes {
         let role = plan.from.model().parameter(&axis.name)?.role;
-        if matches!(role, Role::ConductorIndex | Role::Extinction) {
+        if matches!(role, Role::ConductorIndex | Role::Extinction | Role::DiffuseReflectance) {
             return Ok(false);
         }
     }

@@ -2,7 +2,7 @@
 
 use lookmatch_imaging::{Image, nrmsd};
 use lookmatch_materials::Material;
-use lookmatch_rendering::{EnvironmentLight, Illumination, Part, Renderer, Scene};
+use lookmatch_rendering::{EnvironmentLight, Illumination, Observe, Part, Renderer, Scene, TransportCache};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -107,11 +107,25 @@ impl<'a> Validator<'a> {
     /// # Errors
     /// Where the environment map cannot be read.
     pub fn prepare(probe: &'a Probe, lighting: &Lighting, size: usize) -> Result<Self, RemapError> {
+        Self::cached(probe, lighting, size, &TransportCache::off(), &|_| ())
+    }
+
+    /// [`Validator::prepare`] with light that is kept in a cache; see [`Renderer::cached`].
+    ///
+    /// # Errors
+    /// As [`Validator::prepare`].
+    pub fn cached(
+        probe: &'a Probe,
+        lighting: &Lighting,
+        size: usize,
+        cache: &TransportCache,
+        observe: Observe,
+    ) -> Result<Self, RemapError> {
         let mut scene = Scene::spheres().for_model(probe.from.model()).for_model(probe.to.model());
         if let Some(map) = lighting {
             scene.environment = Some(EnvironmentLight::of(map));
         }
-        let renderer = Renderer::prepare(&scene, Illumination::All, size)?.keep_transport();
+        let renderer = Renderer::cached(&scene, Illumination::All, size, cache, observe)?;
         Ok(Self { probe, scene, renderer })
     }
 

@@ -32,14 +32,18 @@ fn main() {
         "{:<24}{:>12}{:>12}{:>14}{:>18}{:>12}",
         "300 x 300 px", "prepare s", "single ms", "batch of 64 ms", "anisotropic ms", "floor ms"
     );
-    let scenes = [(Scene::reference(), Illumination::Environment)];
+    let scenes = [
+        (Scene::reference(), Illumination::Point),
+        (Scene::reference(), Illumination::Environment),
+        (Scene::spheres(), Illumination::All),
+    ];
     for (scene, light) in scenes {
         let start = Instant::now();
         let renderer = Renderer::prepare(&scene, light, 300).expect("a built-in scene").keep_transport();
         let prepare = start.elapsed().as_secs_f64();
         let single = fastest(5, || drop(renderer.specular_pixels(lobes[0])));
-        let batch = fastest(40, || drop(renderer.specular_batch(&lobes))) / BATCH as f64;
-        let anisotropic = 0.0;
+        let batch = fastest(3, || drop(renderer.specular_batch(&lobes))) / BATCH as f64;
+        let anisotropic = fastest(1, || drop(renderer.specular_pixels(&*brushed)));
         let rows = vec![1.0f32; renderer.subjects().len() * 216];
         let floor = fastest(5, || drop(std::hint::black_box(rows.clone())));
         println!(

@@ -8,6 +8,7 @@
 //! What the pixels see of it is prepared for a few *modes* of E: the principal components of E over some typical lobes.
 
 use std::f64::consts::{PI, TAU};
+use std::io;
 
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use glam::DVec3;
@@ -21,6 +22,7 @@ use crate::arcs::{self, Density, FUNCTION_TERMS, FunctionMoments};
 use crate::bodies::Body;
 use crate::field::Field;
 use crate::film::SurfacePoint;
+use crate::flat::{Flat, Reader, Writer};
 use crate::functions::{COUNT, Functions};
 use crate::grid::Grid;
 use crate::irradiance::Place;
@@ -200,6 +202,58 @@ impl Bounce {
         let (u, v) = map_position(normal);
         let values = self.on_spheres[sphere].at(u, v);
         std::array::from_fn(|m| values[m])
+    }
+}
+
+impl Flat for Operator {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.slice(&self.rows)
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        Ok(Self { rows: input.vec()? })
+    }
+}
+
+impl Flat for Diffuse {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.value(&self.direct)?;
+        out.value(&self.source)?;
+        out.value(&self.again)?;
+        out.value(&self.own)
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        Ok(Self {
+            direct: input.value()?,
+            source: input.value()?,
+            again: input.value()?,
+            own: input.value()?,
+        })
+    }
+}
+
+impl Flat for Bounce {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        self.modes.write(out)?;
+        self.on_spheres.write(out)?;
+        out.value(&self.tint)?;
+        [&self.direct, &self.source, &self.again].into_iter().try_for_each(|o| o.write(out))?;
+        self.diffuse.write(out)?;
+        out.value(&self.lift)
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        Ok(Self {
+            modes: Flat::read(input)?,
+            on_spheres: Flat::read(input)?,
+            tint: input.value()?,
+            direct: Flat::read(input)?,
+            source: Flat::read(input)?,
+            again: Flat::read(input)?,
+            diffuse: Flat::read(input)?,
+            lift: input.value()?,
+        })
     }
 }
 

@@ -1,12 +1,13 @@
 //! Light from far away: a latitude-longitude map, filtered look-ups, its lamps, and the lights that stand for it.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use lookmatch_imaging::Image;
+use lookmatch_imaging::{Image, ImageError};
 
 use crate::angles::{map_direction, map_position};
 use crate::irradiance::SkyLights;
@@ -46,10 +47,27 @@ impl EnvironmentMap {
     /// # Errors
     /// Where the file cannot be read as an image, or is not twice as wide as high.
     pub fn load(light: &EnvironmentLight) -> Result<Self, SceneError> {
+        Self::decode(light, &Self::content(light)?)
+    }
+
+    /// The content of the file that a light names; empty for a map that is computed.
+    pub(crate) fn content(light: &EnvironmentLight) -> Result<Cow<'static, [u8]>, SceneError> {
+        let path = match light.map.as_str() {
+            "designed" => return Ok(Cow::Borrowed(&[])),
+            "interior" => return Ok(Cow::Borrowed(INTERIOR)),
+            path => PathBuf::from(path),
+        };
+        let bytes = std::fs::read(&path);
+        let bytes = bytes.map_err(|source| ImageError::Io { path, action: "read", source })?;
+        Ok(Cow::Owned(bytes))
+    }
+
+    /// The map of a light from its [`EnvironmentMap::content`].
+    pub(crate) fn decode(light: &EnvironmentLight, content: &[u8]) -> Result<Self, SceneError> {
         let image = match light.map.as_str() {
             "designed" => designed_map(),
-            "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), INTERIOR)?,
-            path => lookmatch_imaging::read(Path::new(path))?,
+            "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), content)?,
+            path => lookmatch_imaging::decode(Path::new(path), content)?,
         };
         if image.width() != 2 * image.height() {
             let (width, height) = (image.width(), image.height());

@@ -30,10 +30,11 @@ pub(crate) struct Field {
 }
 
 impl Field {
-    /// Lights every body of the scene: directly, then once more by the light that the other bodies throw back.
-    pub(crate) fn bake(scene: &Scene, illumination: Illumination) -> Result<Self, SceneError> {
+    /// Lights every body of the scene: directly, then once more by the light that the other bodies throw back. `map` is the
+    /// content of its environment map.
+    pub(crate) fn bake(scene: &Scene, illumination: Illumination, map: &[u8]) -> Result<Self, SceneError> {
         let environment = match &scene.environment {
-            Some(light) if illumination.has_environment() => Some(EnvironmentMap::load(light)?),
+            Some(light) if illumination.has_environment() => Some(EnvironmentMap::decode(light, map)?),
             _ => None,
         };
         let points = match illumination.has_points() {

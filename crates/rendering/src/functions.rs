@@ -1,6 +1,10 @@
 //! Some functions on a square, tabulated side by side: of the checkerboard, or of the directions from a sphere's centre.
 
+use std::io;
+
 use rayon::prelude::*;
+
+use crate::flat::{Flat, Reader, Writer};
 
 /// How many.
 pub(crate) const COUNT: usize = 16;
@@ -33,5 +37,15 @@ impl Functions {
         let (a, b, c, d) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1));
         let (wa, wb, wc, wd) = ((1.0 - tx) * (1.0 - ty), tx * (1.0 - ty), (1.0 - tx) * ty, tx * ty);
         std::array::from_fn(|k| wa * a[k] + wb * b[k] + wc * c[k] + wd * d[k])
+    }
+}
+
+impl Flat for Functions {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.slice(&self.values)
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        Ok(Self { values: input.vec()? })
     }
 }

@@ -1,6 +1,8 @@
 //! What the lights without extent make of a lobe directly: point lights, and the environment's lamps close to where they
 //! are mirrored. Evaluated, not integrated: there the basis of the rings would ring.
 
+use std::io;
+
 use glam::DVec3;
 use lookmatch_materials::{Bsdf, Geometry};
 use rayon::prelude::*;
@@ -8,6 +10,7 @@ use rayon::prelude::*;
 use crate::Rgb;
 use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES, SurfacePoint, to_local};
+use crate::flat::{Flat, Reader, Writer};
 use crate::irradiance::from_point;
 
 /// Sub-pixel samples where the half vector comes close to the normal: a lobe of α = 0.01 is no wider than a pixel.
@@ -68,6 +71,25 @@ impl Highlights {
             .zip(&self.irradiances[start..end])
             .map(|([r, g, b], e)| Rgb::new(*r, *g, *b, 0.0) * *e)
             .sum()
+    }
+}
+
+impl Flat for Highlights {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.slice(&self.starts)?;
+        out.slice(&self.irradiances)?;
+        out.slice(&self.geometries.iter().map(|g| [g.wi, g.wo]).collect::<Vec<_>>())?;
+        let angles = |g: &Geometry<f32>| [g.cos_d, g.cos_h, g.tan2_h[0], g.tan2_h[1]];
+        out.slice(&self.geometries.iter().map(angles).collect::<Vec<_>>())
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        let (starts, irradiances) = (input.vec()?, input.vec()?);
+        let (directions, angles): (Vec<[[f32; 3]; 2]>, Vec<[f32; 4]>) = (input.vec()?, input.vec()?);
+        let pairs = directions.into_iter().zip(angles);
+        let geometries =
+            pairs.map(|([wi, wo], [cos_d, cos_h, x, y])| Geometry { wi, wo, cos_d, cos_h, tan2_h: [x, y] });
+        Ok(Self { starts, geometries: geometries.collect(), irradiances })
     }
 }
 

@@ -5,6 +5,7 @@
 //!
 //! Nothing in such a scene changes from picture to picture but the material of the spheres. So the light that reaches
 //! each visible point is prepared once ([`Renderer::prepare`]) and each further picture is a short weighted sum per pixel.
+//! A [`TransportCache`] keeps it for the next program ([`Renderer::cached`]).
 //! All sampling decisions belong to the scene: two pictures differ only by their material, the same material gives
 //! the same bits, on any number of threads.
 //!
@@ -17,11 +18,13 @@ mod angles;
 mod arcs;
 mod bodies;
 mod bounce;
+mod cache;
 mod designed_map;
 mod environment;
 mod error;
 mod field;
 mod film;
+mod flat;
 mod functions;
 mod gather;
 mod grid;
@@ -41,8 +44,10 @@ mod rings;
 mod rows;
 mod sampling;
 mod scene;
+mod source;
 mod transport;
 
+pub use cache::{Observe, Progress, TransportCache};
 pub use designed_map::designed_map;
 pub use environment::EnvironmentMap;
 pub use error::SceneError;

@@ -3,7 +3,7 @@
 use lookmatch_imaging::Image;
 use lookmatch_materials::Material;
 
-use crate::{Illumination, Part, PathTracer, Renderer, Scene, SceneError};
+use crate::{Illumination, Observe, Part, PathTracer, Progress, Renderer, Scene, SceneError, TransportCache};
 
 /// A scene prepared for one illumination and picture size, of which pictures are rendered.
 pub trait Render: Send + Sync {
@@ -32,13 +32,15 @@ impl Render for Renderer {
 }
 
 /// Prepares a scene for pictures of `size` × `size` pixels, with a number of samples per pixel and a seed for renderers
-/// that take samples.
+/// that take samples, and a cache for those whose preparation is worth keeping.
 type Prepare = fn(
     scene: &Scene,
     illumination: Illumination,
     size: usize,
     samples: u32,
     seed: u64,
+    cache: &TransportCache,
+    observe: Observe,
 ) -> Result<Box<dyn Render>, SceneError>;
 
 /// One renderer of the list.
@@ -67,7 +69,14 @@ fn transport(
     size: usize,
     _: u32,
     _: u64,
+    cache: &TransportCache,
+    observe: Observe,
 ) -> Result<Box<dyn Render>, SceneError> {
+    if cache.keeps(size) {
+        return Ok(Box::new(Renderer::cached(scene, light, size, cache, observe)?));
+    }
+    // A picture of a diffuse material can do without the transport, most of the work.
+    observe(Progress::Preparing(0.0));
     Ok(Box::new(Renderer::prepare(scene, light, size)?))
 }
 
@@ -77,6 +86,9 @@ fn path(
     size: usize,
     samples: u32,
     seed: u64,
+    _: &TransportCache,
+    observe: Observe,
 ) -> Result<Box<dyn Render>, SceneError> {
+    observe(Progress::Preparing(0.0));
     Ok(Box::new(PathTracer::prepare(scene, light, size, samples, seed)?))
 }

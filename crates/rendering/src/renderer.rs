@@ -1,23 +1,27 @@
 //! The built-in renderer: a scene prepared for one illumination, and pictures of materials in it.
 
 use std::f32::consts::PI;
+use std::io;
+use std::sync::LazyLock;
 
 use lookmatch_imaging::{Image, Mask};
 use lookmatch_materials::{Bsdf, Material, Role};
 use rayon::prelude::*;
 
 use crate::bodies::Body;
-use crate::bounce::{Bounce, BounceLobe, MODES, Weights};
+use crate::bounce::{Bounce, MODES, Weights};
+use crate::cache::{Observe, Progress, TransportCache};
 use crate::field::Field;
 use crate::film::{Film, SUBSAMPLES, SurfacePoint};
+use crate::flat::{Flat, Reader, Writer};
 use crate::gather;
 use crate::highlights::Highlights;
 use crate::irradiance::Place;
-use crate::lobe_table::LobeTable;
 use crate::lobes::{Expanded, Lobes};
 use crate::returned::{Returned, ReturnedLight};
 use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
+use crate::source::Source;
 use crate::transport::{Lobe, Planes, Transport};
 use crate::{Rgb, SceneError, rgb};
 
@@ -33,16 +37,24 @@ pub enum Part {
     DiffuseOnly,
 }
 
+/// The light of the scene. Where the transport was read, it is baked when it is first needed: only lobes that are not
+/// isotropic look it up.
+type LazyField = LazyLock<Field, Box<dyn FnOnce() -> Field + Send + Sync>>;
+
+/// The share of preparing a scene that is done when gathering its transport starts, about.
+const PREPARED: f64 = 0.2;
+
 /// A scene prepared for one illumination and picture size.
 ///
 /// Subject pixels are those that see a sphere; everything else is the same in every picture.
 pub struct Renderer {
-    field: Field,
+    field: LazyField,
     film: Film,
     /// What is seen beside the subjects, for every pixel.
     background: Vec<Rgb>,
     /// Indices of the subject pixels, by angle of view.
     subjects: Vec<u32>,
+    /// Empty where the transport was read: it is made of them.
     rows: Rows,
     returned: Returned,
     /// The interreflection between subjects and checkerboard, …
@@ -77,12 +89,36 @@ impl Renderer {
     /// # Errors
     /// Where the scene lacks the light that is asked for, or its environment map cannot be read.
     pub fn prepare(scene: &Scene, illumination: Illumination, size: usize) -> Result<Self, SceneError> {
-        scene.check_picture(illumination, size)?;
-        if !scene.meshes.is_empty() {
-            return Err(SceneError::NeedsPath { scene: scene.name.clone() });
-        }
-        let field = Field::bake(scene, illumination)?;
-        let film = Film::new(&scene.camera, size);
+        Self::prepare_source(&Source::new(scene, illumination, size)?)
+    }
+
+    /// [`Renderer::prepare`] and [`Renderer::keep_transport`], or the same read from a cache. `observe` is told what happens;
+    /// it is not to be called by several jobs of one thread pool at once, which might wait for each other.
+    ///
+    /// # Errors
+    /// As [`Renderer::prepare`]: a cache that does not work is only warned of.
+    pub fn cached(
+        scene: &Scene,
+        illumination: Illumination,
+        size: usize,
+        cache: &TransportCache,
+        observe: Observe,
+    ) -> Result<Self, SceneError> {
+        cache.renderer(&Source::new(scene, illumination, size)?, observe)
+    }
+
+    /// Prepares a scene and its transport.
+    pub(crate) fn build(source: &Source, observe: Observe) -> Result<Self, SceneError> {
+        observe(Progress::Preparing(0.0));
+        let renderer = Self::prepare_source(source)?;
+        let share = |share| observe(Progress::Preparing(PREPARED + (1.0 - PREPARED) * share));
+        share(0.0);
+        Ok(renderer.keep_transport_observed(&share))
+    }
+
+    fn prepare_source(source: &Source) -> Result<Self, SceneError> {
+        let (scene, field) = (&source.scene, source.bake()?);
+        let film = Film::new(&scene.camera, source.size);
         let (background, hits) = look(&field, &film);
         let pixels: Vec<u32> = (0..hits.len() as u32).filter(|i| hits[*i as usize]).collect();
         let rows = Rows::new(&field, &film, &pixels);
@@ -96,7 +132,7 @@ impl Renderer {
         let highlights = Highlights::prepare(&field, &film, &subjects);
         let mask = subject_mask(scene, &film)?;
         Ok(Self {
-            field,
+            field: LazyLock::new(Box::new(|| field)),
             film,
             background,
             subjects,
@@ -111,9 +147,19 @@ impl Renderer {
     }
 
     /// Keeps the ring transport for all further pictures: about 1 KB per subject pixel.
-    pub fn keep_transport(mut self) -> Self {
-        self.transport = Some(Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()));
+    pub fn keep_transport(self) -> Self {
+        self.keep_transport_observed(&|_| ())
+    }
+
+    fn keep_transport_observed(mut self, observe: &(dyn Fn(f64) + Sync)) -> Self {
+        if self.transport.is_none() {
+            self.transport = Some(self.gathered(observe));
+        }
         self
+    }
+
+    fn gathered(&self, observe: &(dyn Fn(f64) + Sync)) -> Transport {
+        Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref(), observe)
     }
 
     /// A picture of a material, linear RGB, row 0 on top.
@@ -129,23 +175,16 @@ impl Renderer {
             Part::Full => Lobes::new(&bsdfs),
             Part::DiffuseOnly => Lobes::without_lobes(&bsdfs),
         };
-        let weights = |bsdf: &&dyn Bsdf| match part {
-            Part::Full => self.weights(*bsdf),
-            Part::DiffuseOnly => self.diffuse_weights(bsdf.diffuse()),
-        };
         let planes = self.subject_planes(&lobes);
-        planes.iter().zip(&bsdfs).map(|(planes, bsdf)| self.developed(planes, &weights(bsdf))).collect()
+        let materials = lobes.bsdfs.iter().zip(&lobes.expanded);
+        let weights = materials.map(|(bsdf, expanded)| self.weights(*bsdf, expanded.as_ref()));
+        planes.iter().zip(weights).map(|(planes, weights)| self.developed(planes, &weights)).collect()
     }
 
-    /// The irradiance that a material adds to the checkerboard.
-    fn weights(&self, bsdf: &dyn Bsdf) -> Weights {
-        let lobe = bsdf.sampling().map(|_| BounceLobe::new(&LobeTable::new(bsdf)));
-        self.bounce.as_ref().map_or([[0.0; 3]; MODES], |b| b.weights(lobe.as_ref(), bsdf.diffuse()))
-    }
-
-    /// The same of its diffuse term alone.
-    fn diffuse_weights(&self, albedo: [f64; 3]) -> Weights {
-        self.bounce.as_ref().map_or([[0.0; 3]; MODES], |b| b.weights(None, albedo))
+    /// The irradiance that a material adds to the checkerboard, with or without its lobe.
+    fn weights(&self, bsdf: &dyn Bsdf, lobe: Option<&Expanded>) -> Weights {
+        let weights = |bounce: &Bounce| bounce.weights(lobe.map(|l| &l.bounce), bsdf.diffuse());
+        self.bounce.as_ref().map_or([[0.0; 3]; MODES], weights)
     }
 
     /// The background with the subject pixels laid over it.
@@ -213,7 +252,7 @@ impl Renderer {
             waiting.iter().map(|lobe| lobe.as_ref().and_then(|_| lit.next())).collect();
         let finished = |(((bsdf, _), lobe), image): (((&&dyn Bsdf, _), &Option<Lobe>), Option<Planes>)| {
             let mut planes = if whole { self.returned.baked(bsdf.diffuse()) } else { self.black() };
-            let mut weights = self.diffuse_weights(bsdf.diffuse());
+            let mut weights = self.weights(*bsdf, None);
             if let (Some(image), Some(lobe)) = (image, lobe) {
                 add(&mut planes, &image);
                 self.add_lights(*bsdf, &mut planes);
@@ -232,8 +271,7 @@ impl Renderer {
     }
 
     fn lobe<'a>(&self, bsdf: &dyn Bsdf, expanded: &'a Expanded) -> Lobe<'a> {
-        let weights = |b: &Bounce| b.weights(Some(&expanded.bounce), bsdf.diffuse());
-        let weights = self.bounce.as_ref().map_or([[0.0; 3]; MODES], weights);
+        let weights = self.weights(bsdf, Some(expanded));
         Lobe { weights, table: &expanded.table, is_isotropic: bsdf.is_isotropic() }
     }
 
@@ -242,9 +280,7 @@ impl Renderer {
         match &self.transport {
             _ if lobes.is_empty() => Vec::new(),
             Some(transport) => transport.radiance(lobes),
-            None => {
-                Transport::gather(&self.field, &self.film, &self.rows, self.bounce.as_ref()).radiance(lobes)
-            }
+            None => self.gathered(&|_| ()).radiance(lobes),
         }
     }
 
@@ -268,6 +304,42 @@ impl Renderer {
             [sum.x, sum.y, sum.z]
         };
         self.subjects.par_iter().enumerate().map(pixel).collect()
+    }
+}
+
+impl Renderer {
+    /// Writes what costs time to prepare.
+    pub(crate) fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.slice(&self.background)?;
+        out.slice(&self.subjects)?;
+        self.returned.write(out)?;
+        self.bounce.write(out)?;
+        let (pixels, modes): (Vec<u32>, Vec<[f32; MODES]>) = self.board.iter().copied().unzip();
+        out.slice(&pixels)?;
+        out.slice(&modes)?;
+        self.highlights.write(out)?;
+        self.transport.write(out)
+    }
+
+    /// Reads what was written for the same source.
+    pub(crate) fn read(source: &Source, input: &mut Reader) -> io::Result<Self> {
+        let film = Film::new(&source.scene.camera, source.size);
+        let mask = subject_mask(&source.scene, &film).map_err(io::Error::other)?;
+        let source = source.clone();
+        let bake = move || source.bake().expect("the light was baked before it was kept");
+        Ok(Self {
+            field: LazyLock::new(Box::new(bake)),
+            film,
+            background: input.vec()?,
+            subjects: input.vec()?,
+            rows: Rows::default(),
+            returned: Flat::read(input)?,
+            bounce: Flat::read(input)?,
+            board: input.vec()?.into_iter().zip(input.vec()?).collect(),
+            highlights: Flat::read(input)?,
+            transport: Flat::read(input)?,
+            mask,
+        })
     }
 }
 

@@ -1,9 +1,12 @@
 //! What the diffuse term of all subject pixels reflects: of the baked light, and of irradiance that the material adds to the
 //! checkerboard.
 
+use std::io;
+
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 use crate::bounce::{MODES, Weights};
+use crate::flat::{Flat, Reader, Writer};
 use crate::transport::Planes;
 
 /// One subject pixel: its baked light from spheres with a colour of their own and, for an albedo of 1, from others; the shares
@@ -31,12 +34,16 @@ impl Returned {
             let share = |l: &ReturnedLight| if share < 3 { l.own_share[share] } else { l.white_share };
             lights.clone().map(|l| share(&l) * l.modes[m]).collect()
         };
-        Self {
-            planes: std::array::from_fn(|share| std::array::from_fn(|m| plane(share, m))),
-            own: std::array::from_fn(|c| lights.clone().map(|l| l.own[c]).collect()),
-            white: std::array::from_fn(|c| lights.clone().map(|l| l.white[c]).collect()),
-            has_own: lights.clone().any(|l| l.own_share != [0.0; 3]),
-        }
+        Self::of(
+            std::array::from_fn(|share| std::array::from_fn(|m| plane(share, m))),
+            std::array::from_fn(|c| lights.clone().map(|l| l.own[c]).collect()),
+            std::array::from_fn(|c| lights.clone().map(|l| l.white[c]).collect()),
+        )
+    }
+
+    fn of(planes: [[Vec<f32>; MODES]; 4], own: Planes, white: Planes) -> Self {
+        let has_own = planes[..3].as_flattened().iter().flatten().any(|v| *v != 0.0);
+        Self { planes, own, white, has_own }
     }
 
     /// The baked light for an albedo.
@@ -60,6 +67,22 @@ impl Returned {
                 dispatch!(level, simd => add_modes(simd, &self.planes[3], &white, &mut planes[c]));
             }
         }
+    }
+}
+
+impl Flat for Returned {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        let mut all = self.planes.as_flattened().iter().chain(&self.own).chain(&self.white);
+        all.try_for_each(|plane| out.slice(plane))
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        let mut planes: [[Vec<f32>; MODES]; 4] = Default::default();
+        let (mut own, mut white) = (Planes::default(), Planes::default());
+        for plane in planes.as_flattened_mut().iter_mut().chain(&mut own).chain(&mut white) {
+            *plane = input.vec()?;
+        }
+        Ok(Self::of(planes, own, white))
     }
 }
 

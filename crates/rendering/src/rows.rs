@@ -49,7 +49,7 @@ pub(crate) struct Row {
 
 /// The rows of a picture: the first of every subject pixel, then those that some pixels have more; each part sorted by
 /// angle.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
     /// One for each subject pixel.
     pub(crate) main: Vec<Row>,

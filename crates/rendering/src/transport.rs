@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::io;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,6 +13,7 @@ use crate::arcs::{self, Density, FUNCTION_TERMS};
 use crate::bounce::{Bounce, MODES, Weights};
 use crate::field::Field;
 use crate::film::Film;
+use crate::flat::{Flat, Reader, Writer};
 use crate::highlights::is_near_lamp;
 use crate::lobe_table::LobeTable;
 use crate::product::{self, GROUP, LANES, Lanes, Moments, Reflected};
@@ -62,11 +65,22 @@ pub(crate) struct Lobe<'a> {
 const BLOCK: usize = 32;
 
 impl Transport {
-    /// Gathers the light of all rows.
-    pub(crate) fn gather(field: &Field, film: &Film, rows: &Rows, bounce: Option<&Bounce>) -> Self {
-        let gather = |rows: &[Row]| -> Vec<Bundle> {
-            bundled(rows).into_par_iter().map(|rows| Bundle::gather(field, film, rows, bounce)).collect()
+    /// Gathers the light of all rows; `observe` is told now and then which share of them is done.
+    pub(crate) fn gather(
+        field: &Field,
+        film: &Film,
+        rows: &Rows,
+        bounce: Option<&Bounce>,
+        observe: &(dyn Fn(f64) + Sync),
+    ) -> Self {
+        let (done, total) = (AtomicUsize::new(0), rows.main.len() + rows.more.len());
+        let bundle = |rows: &[Row]| {
+            let bundle = Bundle::gather(field, film, rows, bounce);
+            let before = done.fetch_add(rows.len(), Ordering::Relaxed);
+            observe((before + rows.len()) as f64 / total as f64);
+            bundle
         };
+        let gather = |rows: &[Row]| -> Vec<Bundle> { bundled(rows).into_par_iter().map(bundle).collect() };
         let place: HashMap<u32, u32> = rows.main.iter().zip(0..).map(|(row, k)| (row.pixel, k)).collect();
         Self {
             main: gather(&rows.main),
@@ -221,4 +235,46 @@ fn normal_spread(points: &[View]) -> f64 {
     // A square of side s has a variance of s²/6; its mirror image is twice as wide and shared by n samples. Half of that
     // width: a wider filter blurs small pictures more than the points alias.
     ((6.0 * variance).sqrt() / n.sqrt()).min(PI / 16.0)
+}
+
+impl Flat for Transport {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        self.main.write(out)?;
+        self.more.write(out)?;
+        out.slice(&self.places)
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        Ok(Self { main: Flat::read(input)?, more: Flat::read(input)?, places: input.vec()? })
+    }
+}
+
+impl Flat for Bundle {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.value(&self.theta)?;
+        out.value(&(self.len as u64))?;
+        out.value(&*self.moments)?;
+        self.reflected.write(out)
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        let (theta, len) = (input.value()?, input.value::<u64>()?);
+        Ok(Self {
+            theta,
+            len: LANES.min(len as usize),
+            moments: Box::new(input.value()?),
+            reflected: Flat::read(input)?,
+        })
+    }
+}
+
+impl Flat for Box<Reflected> {
+    fn write(&self, out: &mut Writer) -> io::Result<()> {
+        out.value(&self.board)?;
+        out.value(&self.modes)
+    }
+
+    fn read(input: &mut Reader) -> io::Result<Self> {
+        Ok(Self::new(Reflected { board: input.value()?, modes: input.value()? }))
+    }
 }

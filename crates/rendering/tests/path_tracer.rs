@@ -8,7 +8,7 @@ use lookmatch_imaging::Image;
 use lookmatch_materials::Material;
 use lookmatch_rendering::{
     Camera, EnvironmentLight, Illumination, Mesh, Part, PathTracer, Plane, PointLight, RENDERERS, Render,
-    Renderer, Scene, SceneError, Sphere,
+    Renderer, Scene, SceneError, Sphere, TransportCache,
 };
 
 const SIZE: usize = 32;
@@ -332,7 +332,16 @@ fn faults_of_meshes() {
 fn the_list_of_renderers() {
     for (entry, name) in RENDERERS.iter().zip(["transport", "path"]) {
         assert_eq!(entry.name, name);
-        let renderer = (entry.prepare)(&Scene::reference(), Illumination::Point, 8, 4, 1).unwrap();
+        let renderer = (entry.prepare)(
+            &Scene::reference(),
+            Illumination::Point,
+            8,
+            4,
+            1,
+            &TransportCache::off(),
+            &|_| (),
+        )
+        .unwrap();
         assert_eq!((renderer.size(), renderer.render(&material("ward"), Part::Full).width()), (8, 8));
     }
     for samples in [0, (1 << 20) + 1] {

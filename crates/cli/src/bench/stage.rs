@@ -25,8 +25,8 @@ pub(crate) struct Preparation {
 }
 
 impl Stage {
-    /// Prepares a scene with nothing kept from before: the full cost is what is measured. Where prepared light is kept
-    /// on disk, it must be bypassed here.
+    /// Prepares a scene with nothing kept from before: the full cost is what is measured, so that the cache of prepared
+    /// light is bypassed.
     pub(crate) fn prepare(scene: &Scene, size: usize) -> anyhow::Result<(Self, Preparation)> {
         let progress = spinner("preparing the scene");
         let (cpu, wall) = (ProcessTime::now(), Instant::now());

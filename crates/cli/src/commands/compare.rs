@@ -7,13 +7,17 @@ use serde_json::json;
 use crate::args::CompareArgs;
 use crate::commands::{create_folder, lit_scene, material};
 use crate::output::{print, print_json, score, spinner, table};
+use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
     let (source, target) = (material(&args.source)?, material(&args.target)?);
     let (scene, illumination) = lit_scene(&args.scene, &args.light)?;
     let scene = scene.for_model(source.model()).for_model(target.model());
+    let preparation = Preparation::of("the scene");
+    let observe = |progress| preparation.observe(progress);
+    let renderer = Renderer::cached(&scene, illumination, args.size, &cache(), &observe)?;
+    preparation.finish();
     let progress = spinner("rendering");
-    let renderer = Renderer::prepare(&scene, illumination, args.size)?.keep_transport();
     let (a, b) = (renderer.render(&source, Part::Full), renderer.render(&target, Part::Full));
     progress.finish_and_clear();
     let (whole, masked) = (nrmsd(&a, &b, None)?, nrmsd(&a, &b, Some(renderer.mask()))?);

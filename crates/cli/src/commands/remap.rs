@@ -13,7 +13,8 @@ use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::{check_output, create_folder};
-use crate::output::{bar, print_json, spinner};
+use crate::output::{bar, print_json};
+use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
 
 pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
@@ -61,9 +62,9 @@ fn search(plan: &Plan, args: &RemapArgs) -> anyhow::Result<Probe> {
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = stopped.clone();
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
-    let progress = spinner("preparing the reference scene");
-    let stage = Stage::prepare(plan)?;
-    progress.finish_and_clear();
+    let preparation = Preparation::of("the reference scene");
+    let stage = Stage::cached(plan, &cache(), &|progress| preparation.observe(progress))?;
+    preparation.finish();
     let total = plan.source_axes.iter().map(|axis| axis.len()).product();
     let progress = bar(total, "matching");
     let mut observe = |event: Event| match event {

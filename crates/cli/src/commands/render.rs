@@ -9,7 +9,8 @@ use serde_json::json;
 use crate::Usage;
 use crate::args::RenderArgs;
 use crate::commands::{check_picture, lit_scene, material};
-use crate::output::{bar, print_json, spinner};
+use crate::output::{bar, print_json};
+use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let entry = renderer(&args.renderer)?;
@@ -17,10 +18,12 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let (scene, illumination) = lit_scene(&args.scene, &args.light)?;
     check_picture(&args.output)?;
     let started = Instant::now();
-    let progress = spinner("preparing");
     let scene = scene.for_model(material.model());
-    let renderer = (entry.prepare)(&scene, illumination, args.size, args.samples, args.seed)?;
-    progress.finish_and_clear();
+    let preparation = Preparation::of("the scene");
+    let observe = |progress| preparation.observe(progress);
+    let renderer =
+        (entry.prepare)(&scene, illumination, args.size, args.samples, args.seed, &cache(), &observe)?;
+    let transport = preparation.finish();
     let progress = bar(args.size * args.size, "rendering");
     let part = if args.diffuse_only { Part::DiffuseOnly } else { Part::Full };
     let image = renderer.render_observed(&material, part, &|done| progress.set_position(done as u64));
@@ -35,6 +38,7 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
             "part": if args.diffuse_only { "diffuse" } else { "full" }, "material": material,
             "renderer": entry.name, "samples": entry.is_sampled.then_some(args.samples),
             "seed": entry.is_sampled.then_some(args.seed), "seconds": seconds,
+            "transport": (!entry.is_sampled).then_some(transport),
         });
         return print_json(&summary);
     }

@@ -5,8 +5,9 @@ use lookmatch_remap::{Lighting, Probe, ValidationReport, Validator, validation_p
 use crate::Usage;
 use crate::args::ValidateArgs;
 use crate::commands::check_output;
-use crate::output::{bar, print, print_json, spinner};
+use crate::output::{bar, print, print_json};
 use crate::report::scores_table;
+use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     if args.points == Some(0) {
@@ -36,11 +37,12 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     print(&text.join("\n"))
 }
 
-/// Prepares the validation scene under a light, with a sign of life.
+/// Prepares the validation scene under a light, with a sign of life where it takes time.
 pub(crate) fn prepared<'a>(probe: &'a Probe, light: &Lighting, size: usize) -> anyhow::Result<Validator<'a>> {
-    let progress = spinner("preparing the validation scene");
-    let validator = Validator::prepare(probe, light, size)?;
-    progress.finish_and_clear();
+    let preparation = Preparation::of("the validation scene");
+    let observe = |progress| preparation.observe(progress);
+    let validator = Validator::cached(probe, light, size, &cache(), &observe)?;
+    preparation.finish();
     Ok(validator)
 }
 

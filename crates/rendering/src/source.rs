@@ -1,0 +1,85 @@
+//! All that prepared light depends on, and its key.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use blake3::{Hash, Hasher};
+use fearless_simd::Level;
+
+use crate::SceneError;
+use crate::environment::EnvironmentMap;
+use crate::field::Field;
+use crate::flat::FORMAT_VERSION;
+use crate::scene::{Illumination, Scene};
+
+/// To be raised with every change of the renderer that changes a bit of what it prepares: files that an older program
+/// kept are then left alone, and built again.
+const ALGORITHM_VERSION: u32 = 1;
+
+/// A scene, its lights and a picture size, with the content of the environment map.
+#[derive(Clone, Debug)]
+pub(crate) struct Source {
+    pub(crate) scene: Scene,
+    illumination: Illumination,
+    pub(crate) size: usize,
+    /// The file of the map, read once: what is baked is what the key was made of.
+    map: Cow<'static, [u8]>,
+}
+
+impl Source {
+    /// Checks a scene and reads its map.
+    pub(crate) fn new(scene: &Scene, illumination: Illumination, size: usize) -> Result<Self, SceneError> {
+        scene.check_picture(illumination, size)?;
+        if !scene.meshes.is_empty() {
+            return Err(SceneError::NeedsPath { scene: scene.name.clone() });
+        }
+        let light = scene.environment.as_ref().filter(|_| illumination.has_environment());
+        let map = light.map_or(Ok(Cow::default()), EnvironmentMap::content)?;
+        Ok(Self { scene: scene.clone(), illumination, size, map })
+    }
+
+    /// Lights every body of the scene.
+    pub(crate) fn bake(&self) -> Result<Field, SceneError> {
+        Field::bake(&self.scene, self.illumination, &self.map)
+    }
+
+    /// Equal for sources whose prepared light is the same to the bit, and for no others.
+    pub(crate) fn key(&self) -> Hash {
+        let scene = toml::to_string(&self.relevant()).expect("a scene is plain data");
+        let lights = format!("{:?}", self.illumination);
+        // Instruction sets round differently, and numbers are kept as the processor holds them.
+        let machine = format!("{} {:?}", std::env::consts::ARCH, Level::new());
+        let mut hasher = Hasher::new();
+        for version in [FORMAT_VERSION, ALGORITHM_VERSION] {
+            hasher.update(&version.to_le_bytes());
+        }
+        hasher.update(&(self.size as u64).to_le_bytes());
+        for part in [env!("CARGO_PKG_VERSION").as_bytes(), machine.as_bytes(), lights.as_bytes()] {
+            add(&mut hasher, part);
+        }
+        add(&mut hasher, scene.as_bytes());
+        add(&mut hasher, &self.map);
+        hasher.finalize()
+    }
+
+    /// The scene without what leaves no trace in the light: its name, lights that are off, and where the map lies.
+    fn relevant(&self) -> Scene {
+        let mut scene = Scene { name: String::new(), ..self.scene.clone() };
+        if !self.illumination.has_points() {
+            scene.point_lights.clear();
+        }
+        scene.environment = scene.environment.filter(|_| self.illumination.has_environment());
+        if let Some(light) = &mut scene.environment
+            && let Some(extension) = Path::new(&light.map).extension()
+        {
+            // It tells the format of the content.
+            light.map = format!(".{}", extension.to_string_lossy().to_lowercase());
+        }
+        scene
+    }
+}
+
+/// Adds a part and where it ends.
+fn add(hasher: &mut Hasher, part: &[u8]) {
+    hasher.update(&(part.len() as u64).to_le_bytes()).update_rayon(part);
+}
