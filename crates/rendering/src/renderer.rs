@@ -92,8 +92,8 @@ impl Renderer {
         Self::prepare_source(&Source::new(scene, illumination, size)?)
     }
 
-    /// [`Renderer::prepare`] and [`Renderer::keep_transport`], or the same read from a cache. `observe` is told what happens;
-    /// it is not to be called by several jobs of one thread pool at once, which might wait for each other.
+    /// [`Renderer::prepare`] and [`Renderer::keep_transport`], or the same read from a cache. `observe` is told what happens.
+    /// Jobs of one thread pool must not call this at the same time: they might wait for each other for ever.
     ///
     /// # Errors
     /// As [`Renderer::prepare`]: a cache that does not work is only warned of.
@@ -326,7 +326,7 @@ impl Renderer {
         let film = Film::new(&source.scene.camera, source.size);
         let mask = subject_mask(&source.scene, &film).map_err(io::Error::other)?;
         let source = source.clone();
-        let bake = move || source.bake().expect("the light was baked before it was kept");
+        let bake = move || source.bake_apart().expect("the light was baked before it was kept");
         Ok(Self {
             field: LazyLock::new(Box::new(bake)),
             film,

@@ -2,9 +2,11 @@
 
 use std::borrow::Cow;
 use std::path::Path;
+use std::sync::mpsc;
 
 use blake3::{Hash, Hasher};
 use fearless_simd::Level;
+use rayon::ThreadPoolBuilder;
 
 use crate::SceneError;
 use crate::environment::EnvironmentMap;
@@ -41,6 +43,15 @@ impl Source {
     /// Lights every body of the scene.
     pub(crate) fn bake(&self) -> Result<Field, SceneError> {
         Field::bake(&self.scene, self.illumination, &self.map)
+    }
+
+    /// [`Source::bake`] in threads of its own, for a caller that others may wait for: a thread of the common pool that waits
+    /// for its share of the work takes up other jobs meanwhile, and must not take up one that waits for the light.
+    pub(crate) fn bake_apart(self) -> Result<Field, SceneError> {
+        let Ok(pool) = ThreadPoolBuilder::new().build() else { return self.bake() };
+        let (send, receive) = mpsc::channel();
+        pool.spawn(move || send.send(self.bake()).expect("the receiver waits"));
+        receive.recv().expect("a job that ends")
     }
 
     /// Equal for sources whose prepared light is the same to the bit, and for no others.

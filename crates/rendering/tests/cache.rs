@@ -8,6 +8,7 @@ use std::time::{Duration, SystemTime};
 use lookmatch_imaging::Image;
 use lookmatch_materials::Material;
 use lookmatch_rendering::{EnvironmentLight, Illumination, Part, Progress, Renderer, Scene, TransportCache};
+use rayon::prelude::*;
 use tempfile::TempDir;
 
 const SIZE: usize = 16;
@@ -74,6 +75,24 @@ fn kept_light_gives_the_same_bits() {
             let found = (pictures(&renderer), renderer.subjects().to_vec(), renderer.mask().clone());
             assert!(found == expected, "{} {light:?}", scene.name);
         }
+    }
+}
+
+/// The light that an anisotropic lobe looks up is baked by whichever thread comes first, while all others wait.
+#[test]
+fn kept_light_is_baked_from_any_thread() {
+    let folder = TempDir::new().unwrap();
+    let cache = TransportCache::new(folder.path());
+    let brushed = Material::parse("ward:roughness_u=0.1,roughness_v=0.3").unwrap();
+    let scene = Scene { camera: Scene::spheres().camera, ..Scene::reference() };
+    let (built, _) = made(&scene, Illumination::Point, SIZE, &cache);
+    let expected = built.render(&brushed, Part::Full);
+    for _ in 0..4 {
+        let (read, told) = made(&scene, Illumination::Point, SIZE, &cache);
+        assert_eq!(told, [Progress::Loaded]);
+        let pictures: Vec<Image> =
+            (0..16).into_par_iter().map(|_| read.render(&brushed, Part::Full)).collect();
+        assert!(pictures.iter().all(|picture| *picture == expected));
     }
 }
 
