@@ -298,8 +298,7 @@ fn stopped() -> RemapError {
     RemapError::Search(SearchError::Objective(Box::new(Stopped)))
 }
 
-/// True where no source axis changes what a target takes over, but for the diffuse reflectance, which the specular
-/// appearance does not depend on.
+/// True where no source axis changes what a target takes over.
 fn targets_are_shared(plan: &Plan) -> Result<bool, RemapError> {
     for axis in &plan.source_axes {
         let role = plan.from.model().parameter(&axis.name)?.role;
