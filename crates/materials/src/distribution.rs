@@ -31,11 +31,13 @@ impl Distribution {
     }
 
     /// Density D of normals at the half vector, in 1/sr.
+    #[inline(always)]
     pub fn density<T: Real>(&self, g: &Geometry<T>) -> T {
         let [ax, ay] = self.alpha.map(T::of);
         let cos2 = g.cos_h * g.cos_h;
-        // (hx/αx)² + (hy/αy)² over hz²
-        let slope2 = g.tan2_h[0] / (ax * ax) + g.tan2_h[1] / (ay * ay);
+        // (hx/αx)² + (hy/αy)² over hz²; multiplied, because a division costs as much as all the rest.
+        let [over_x, over_y] = self.alpha.map(|a| T::of(1.0 / (a * a)));
+        let slope2 = g.tan2_h[0] * over_x + g.tan2_h[1] * over_y;
         match self.shape {
             Shape::Ggx => {
                 let t = cos2 * (T::one() + slope2);

@@ -28,6 +28,7 @@ pub enum Fresnel {
 
 impl Fresnel {
     /// Reflectance at an angle whose cosine (0 to 1) is `cos`.
+    #[inline(always)]
     pub fn reflectance<T: Real>(&self, cos: T) -> T {
         match *self {
             Self::None => T::one(),
@@ -42,6 +43,7 @@ impl Fresnel {
 }
 
 /// Fresnel's equations for a dielectric interface, unpolarised.
+#[inline(always)]
 fn dielectric<T: Real>(cos_i: T, eta: T) -> T {
     let sin2_t = (T::one() - cos_i * cos_i) / (eta * eta);
     if sin2_t >= T::one() {
@@ -56,6 +58,7 @@ fn dielectric<T: Real>(cos_i: T, eta: T) -> T {
 /// Fresnel's equations with a complex index, unpolarised, written in reals.
 ///
 /// `a² + b²` and `a` are the modulus and real part of `√(N² − sin²)`; see Born & Wolf, *Principles of Optics*, 14.2.
+#[inline(always)]
 fn conductor<T: Real>(cos: T, eta: T, k: T) -> T {
     let (two, cos2) = (T::of(2.0), cos * cos);
     let sin2 = T::one() - cos2;

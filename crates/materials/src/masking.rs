@@ -24,6 +24,7 @@ pub enum Masking {
 
 impl Masking {
     /// The fraction of microfacets seen and lit, 0 to 1.
+    #[inline(always)]
     pub fn visibility<T: Real>(self, distribution: &Distribution, g: &Geometry<T>) -> T {
         let one = T::one();
         let lambda = |w: &[T; 3], rational| smith_lambda(distribution, w, rational);
@@ -42,6 +43,7 @@ impl Masking {
 }
 
 /// Smith's auxiliary function Λ, with `G1 = 1/(1 + Λ)` (Heitz 2014, eq. 43). The Phong shape borrows Beckmann's.
+#[inline(always)]
 pub fn smith_lambda<T: Real>(distribution: &Distribution, w: &[T; 3], rational: bool) -> T {
     let [ax, ay] = distribution.alpha.map(T::of);
     let projected2 = ax * ax * w[0] * w[0] + ay * ay * w[1] * w[1];

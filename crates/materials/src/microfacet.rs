@@ -28,6 +28,7 @@ impl Lobe for Microfacet {
         self.diffuse
     }
 
+    #[inline(always)]
     fn specular<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
         let shape = self.distribution.density(g) * self.masking.visibility(&self.distribution, g)
             / (T::of(4.0) * g.cos_i() * g.cos_o());

@@ -35,8 +35,8 @@ use crate::scene::Scene;
 
 /// Principal components of the added irradiance.
 pub(crate) const MODES: usize = 8;
-/// Angles of view that the operators are tabulated for: every third of those of a [`LobeTable`].
-const ANGLES: usize = 17;
+/// Angles of view that the operators are tabulated for: every fourth of those of a [`LobeTable`].
+const ANGLES: usize = 9;
 /// Basis functions of a ring that the operators know: the first terms of every node.
 const ROW: usize = NODES * FUNCTION_TERMS;
 /// Coefficients of a lobe that matter here.
@@ -138,7 +138,7 @@ pub(crate) struct BounceLobe {
 impl BounceLobe {
     pub(crate) fn new(lobe: &LobeTable) -> Self {
         let mut channels = Box::new([[0.0; LOBE]; 3]);
-        for (angle, coefficients) in lobe.every_third().enumerate() {
+        for (angle, coefficients) in lobe.every_fourth().enumerate() {
             for i in 0..ROW {
                 let value = coefficients[i / FUNCTION_TERMS * TERMS + i % FUNCTION_TERMS];
                 (0..3).for_each(|c| channels[c][angle * ROW + i] = value[c]);

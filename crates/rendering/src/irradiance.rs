@@ -88,14 +88,14 @@ impl Bodies {
             let along = dot(direction, from_centre);
             // Squared distance of the ray's line from the centre.
             let axis = along.mul_add(-along, from_centre.length_squared() as f32);
-            hidden = hidden | (along.simd_lt(0.0) & axis.simd_lt((radius * radius) as f32));
+            hidden |= along.simd_lt(0.0) & axis.simd_lt((radius * radius) as f32);
         }
         if let Some((height, half)) = self.plane().filter(|_| place.body != Body::Plane) {
             let [x, y, z] = direction;
             let distance = f32x16::splat(simd, (height - place.position.y) as f32) / y;
             let reach = |axis: f32x16<S>, start: f64| distance.mul_add(axis, start as f32).abs();
             let inside = reach(x, place.position.x).max(reach(z, place.position.z)).simd_le(half as f32);
-            hidden = hidden | (inside & distance.simd_gt(0.0));
+            hidden |= inside & distance.simd_gt(0.0);
         }
         !hidden
     }

@@ -9,12 +9,11 @@ use lookmatch_materials::{Bsdf, Geometry};
 use crate::rings::{NODES, ROW, Ring, TERMS, chebyshev, node, project};
 
 /// Tabulated angles of view from 0 to just short of π/2; between them, cubic interpolation.
-const ANGLES: usize = 49;
+const ANGLES: usize = 33;
 /// Interpolation points on each ring.
 const POINTS: usize = 5;
 /// Quadrature points between two nodes, as fractions of their distance, and their weights (Gauss–Legendre).
-const GAUSS: [(f64, f64); 3] =
-    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
 /// The coefficients of one lobe at one angle of view, by basis function and channel.
 pub(crate) type Coefficients = [[f32; 3]; ROW];
@@ -57,9 +56,9 @@ impl LobeTable {
         spacing() * (ANGLES - 1) as f64
     }
 
-    /// The coefficients at every third of the tabulated angles, the last among them.
-    pub(crate) fn every_third(&self) -> impl Iterator<Item = &Coefficients> {
-        self.angles.iter().step_by(3)
+    /// The coefficients at every fourth of the tabulated angles, the last among them.
+    pub(crate) fn every_fourth(&self) -> impl Iterator<Item = &Coefficients> {
+        self.angles.iter().step_by(4)
     }
 
     /// The coefficients at an angle of view, in radians.

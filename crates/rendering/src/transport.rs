@@ -25,7 +25,7 @@ use crate::rows::{Row, Rows, View};
 const ANGLE_STEP: f64 = 1e-3;
 
 /// Rings sampled between two nodes, inner and outer ones.
-const STRATA: [usize; 2] = [8, 5];
+const STRATA: [usize; 2] = [7, 4];
 
 /// The light that reaches all subject pixels, in the basis of the rings.
 #[derive(Clone, Debug)]

@@ -43,8 +43,8 @@ impl Effort {
     /// What published figures need: minutes.
     pub(crate) const FULL: Self = Self {
         size: 300,
-        pixels: 200,
-        samples: 2048,
+        pixels: 100,
+        samples: 6144,
         batch: 64,
         runs: 5,
         peer_samples: [16, 64, 256],

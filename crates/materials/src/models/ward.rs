@@ -105,6 +105,7 @@ impl Lobe for Ward {
         self.diffuse
     }
 
+    #[inline(always)]
     fn specular<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
         let [ax, ay] = self.alpha.map(T::of);
         let exponential = (-(g.tan2_h[0] / (ax * ax) + g.tan2_h[1] / (ay * ay))).exp();
