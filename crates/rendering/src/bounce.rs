@@ -34,7 +34,7 @@ use crate::sampling::{cosine_direction, frame, zero_two};
 use crate::scene::Scene;
 
 /// Principal components of the added irradiance.
-pub(crate) const MODES: usize = 8;
+pub(crate) const MODES: usize = 6;
 /// Angles of view that the operators are tabulated for: every fourth of those of a [`LobeTable`].
 const ANGLES: usize = 9;
 /// Basis functions of a ring that the operators know: the first terms of every node.

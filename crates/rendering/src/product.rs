@@ -21,7 +21,7 @@ pub(crate) type Lanes = [f32; LANES];
 pub(crate) type Moments = [[Lanes; 3]; ROW];
 
 /// Neighbouring nodes that share the means of the modes.
-pub(crate) const GROUP: usize = 4;
+pub(crate) const GROUP: usize = 8;
 const GROUPS: usize = NODES / GROUP;
 const _: () = assert!(NODES.is_multiple_of(GROUP));
 

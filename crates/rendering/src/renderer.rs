@@ -246,24 +246,28 @@ impl Renderer {
     fn planes(&self, lobes: &Lobes, whole: bool) -> Vec<Planes> {
         let materials = lobes.bsdfs.par_iter().zip(&lobes.expanded);
         let waiting: Vec<Option<Lobe>> =
-            materials.clone().map(|(b, e)| Some(self.lobe(*b, e.as_ref()?))).collect();
+            materials.map(|(bsdf, expanded)| Some(self.lobe(*bsdf, expanded.as_ref()?))).collect();
         let mut lit = self.lit(&waiting.iter().flatten().collect::<Vec<_>>()).into_iter();
-        let images: Vec<Option<Planes>> =
-            waiting.iter().map(|lobe| lobe.as_ref().and_then(|_| lit.next())).collect();
-        let finished = |(((bsdf, _), lobe), image): (((&&dyn Bsdf, _), &Option<Lobe>), Option<Planes>)| {
-            let mut planes = if whole { self.returned.baked(bsdf.diffuse()) } else { self.black() };
-            let mut weights = self.weights(*bsdf, None);
-            if let (Some(image), Some(lobe)) = (image, lobe) {
+        let lit: Vec<Option<(&Lobe, Planes)>> =
+            waiting.iter().map(|lobe| lobe.as_ref().and_then(|lobe| Some((lobe, lit.next()?)))).collect();
+        lobes.bsdfs.par_iter().zip(lit).map(|(bsdf, lit)| self.finished(*bsdf, lit, whole)).collect()
+    }
+
+    /// What the rings made of a lobe, with all that they do not hold.
+    fn finished(&self, bsdf: &dyn Bsdf, lit: Option<(&Lobe, Planes)>, whole: bool) -> Planes {
+        let mut planes = if whole { self.returned.baked(bsdf.diffuse()) } else { self.black() };
+        let mut weights = self.weights(bsdf, None);
+        match lit {
+            Some((lobe, image)) => {
                 add(&mut planes, &image);
-                self.add_lights(*bsdf, &mut planes);
+                self.add_lights(bsdf, &mut planes);
                 weights = if whole { lobe.weights } else { difference(&lobe.weights, &weights) };
-            } else if !whole {
-                return planes;
             }
-            self.returned.add(&weights, bsdf.diffuse(), &mut planes);
-            planes
-        };
-        materials.zip(&waiting).zip(images).map(finished).collect()
+            None if whole => {}
+            None => return planes,
+        }
+        self.returned.add(&weights, bsdf.diffuse(), &mut planes);
+        planes
     }
 
     fn black(&self) -> Planes {
