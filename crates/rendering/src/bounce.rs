@@ -730,7 +730,7 @@ fn mirror_point(centre: DVec3, radius: f64, point: DVec3, source: DVec3) -> DVec
 
 /// The tabulated angles around one, with their weights.
 fn angle_position(theta: f64) -> [(usize, f64); 2] {
-    let x = (theta / (LobeTable::last_angle() / (ANGLES - 1) as f64)).clamp(0.0, (ANGLES - 1) as f64);
+    let x = LobeTable::place(theta) / 4.0;
     let index = (x as usize).min(ANGLES - 2);
     [(index, 1.0 - (x - index as f64)), (index + 1, x - index as f64)]
 }

@@ -9,10 +9,9 @@
 //! All sampling decisions belong to the scene: two pictures differ only by their material, the same material gives
 //! the same bits, on any number of threads.
 //!
-//! What is transported: all direct light, hard shadows of point lights, the checkerboard and (where they have a diffuse
-//! colour of their own) the other spheres as seen in each sphere, with one diffuse bounce between them. What is left
-//! out: light that a sphere throws back onto the checkerboard when its colour is the material's, and the highlights of
-//! one sphere seen in another. `docs/engine.md` has the measured size of both.
+//! What is transported: all direct light, hard shadows of point lights, all interreflection between each sphere and the
+//! checkerboard, and (where they have a diffuse colour of their own) one diffuse bounce between spheres. What is left out:
+//! the highlights of one sphere seen in another. `docs/engine.md` has the measured errors.
 
 mod angles;
 mod arcs;

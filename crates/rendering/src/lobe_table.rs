@@ -10,10 +10,15 @@ use crate::rings::{NODES, ROW, Ring, TERMS, chebyshev, node, project};
 
 /// Tabulated angles of view from 0 to just short of π/2; between them, cubic interpolation.
 const ANGLES: usize = 33;
+/// The last of them, just short of π/2, where no geometry exists.
+const LAST_ANGLE: f64 = FRAC_PI_2 - 1e-3;
+/// They are the denser, the closer to grazing: the power by which their distance from it falls.
+const GRAZING: f64 = 1.5;
 /// Interpolation points on each ring.
 const POINTS: usize = 5;
 /// Quadrature points between two nodes, as fractions of their distance, and their weights (Gauss–Legendre).
-const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// The coefficients of one lobe at one angle of view, by basis function and channel.
 pub(crate) type Coefficients = [[f32; 3]; ROW];
@@ -51,9 +56,10 @@ impl LobeTable {
         Self { angles: products.iter_mut().map(coefficients).collect() }
     }
 
-    /// The largest tabulated angle, in radians.
-    pub(crate) fn last_angle() -> f64 {
-        spacing() * (ANGLES - 1) as f64
+    /// Where an angle of view, in radians, lies among the tabulated ones, from 0 to the last.
+    pub(crate) fn place(theta: f64) -> f64 {
+        let t = 1.0 - (1.0 - theta / LAST_ANGLE).max(0.0).powf(1.0 / GRAZING);
+        t.clamp(0.0, 1.0) * (ANGLES - 1) as f64
     }
 
     /// The coefficients at every fourth of the tabulated angles, the last among them.
@@ -63,7 +69,7 @@ impl LobeTable {
 
     /// The coefficients at an angle of view, in radians.
     pub(crate) fn at(&self, theta: f64) -> Coefficients {
-        let x = (theta / spacing()).clamp(0.0, (ANGLES - 1) as f64);
+        let x = Self::place(theta);
         let first = (x as usize).saturating_sub(1).min(ANGLES - 4);
         let weights = cubic(x - first as f64).map(|w| w as f32);
         let mut blended = [[0.0; 3]; ROW];
@@ -124,9 +130,9 @@ fn cubic(x: f64) -> [f64; 4] {
     [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0]
 }
 
-/// Distance between tabulated angles; the last lies 1e-3 short of grazing, where no geometry exists.
-fn spacing() -> f64 {
-    (FRAC_PI_2 - 1e-3) / (ANGLES - 1) as f64
+/// A tabulated angle of view, in radians.
+fn tabulated_angle(index: usize) -> f64 {
+    LAST_ANGLE * (1.0 - (1.0 - index as f64 / (ANGLES - 1) as f64).powf(GRAZING))
 }
 
 /// A ring that lobes are evaluated on: at [`POINTS`] places.
@@ -148,7 +154,7 @@ struct Quadrature {
 static QUADRATURE: LazyLock<Quadrature> = LazyLock::new(|| {
     let mut quadrature = Quadrature { rings: Vec::new(), geometries: Vec::new(), weights: Vec::new() };
     for angle in 0..ANGLES {
-        let theta_o = angle as f64 * spacing();
+        let theta_o = tabulated_angle(angle);
         for interval in 0..NODES - 1 {
             for (hat, share) in GAUSS {
                 quadrature.add_ring(SampledRing { angle, interval, hat }, theta_o, share);

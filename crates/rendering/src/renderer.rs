@@ -146,7 +146,7 @@ impl Renderer {
         })
     }
 
-    /// Keeps the ring transport for all further pictures: about 1 KB per subject pixel.
+    /// Keeps the ring transport for all further pictures: about 2 KB per subject pixel.
     pub fn keep_transport(self) -> Self {
         self.keep_transport_observed(&|_| ())
     }
