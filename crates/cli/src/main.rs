@@ -12,11 +12,18 @@ mod transport;
 
 use std::process::ExitCode;
 
+use mimalloc::MiMalloc;
+
 use clap::Parser;
 
 use args::{Arguments, Command};
 use lookmatch_materials::MaterialError;
 use lookmatch_remap::RemapError;
+
+/// Pictures come and go by the thousand. This allocator keeps their memory; the system's hands it back to the kernel, and
+/// every page of the next picture costs a fault again.
+#[global_allocator]
+static ALLOCATOR: MiMalloc = MiMalloc;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();

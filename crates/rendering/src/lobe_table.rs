@@ -67,15 +67,13 @@ impl LobeTable {
         self.angles.iter().step_by(4)
     }
 
-    /// The coefficients at an angle of view, in radians.
-    pub(crate) fn at(&self, theta: f64) -> Coefficients {
+    /// Sets the coefficients at an angle of view, in radians.
+    pub(crate) fn at(&self, theta: f64, out: &mut Coefficients) {
         let x = Self::place(theta);
         let first = (x as usize).saturating_sub(1).min(ANGLES - 4);
         let weights = cubic(x - first as f64).map(|w| w as f32);
-        let mut blended = [[0.0; 3]; ROW];
         let level = Level::new();
-        dispatch!(level, simd => blend(simd, &self.angles[first..first + 4], weights, blended.as_flattened_mut()));
-        blended
+        dispatch!(level, simd => blend(simd, &self.angles[first..first + 4], weights, out.as_flattened_mut()));
     }
 }
 

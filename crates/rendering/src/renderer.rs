@@ -255,16 +255,17 @@ impl Renderer {
 
     /// What the rings made of a lobe, with all that they do not hold.
     fn finished(&self, bsdf: &dyn Bsdf, lit: Option<(&Lobe, Planes)>, whole: bool) -> Planes {
-        let mut planes = if whole { self.returned.baked(bsdf.diffuse()) } else { self.black() };
-        let mut weights = self.weights(bsdf, None);
-        match lit {
-            Some((lobe, image)) => {
-                add(&mut planes, &image);
-                self.add_lights(bsdf, &mut planes);
-                weights = if whole { lobe.weights } else { difference(&lobe.weights, &weights) };
+        let without = self.weights(bsdf, None);
+        let (mut planes, weights) = match lit {
+            Some((lobe, mut image)) => {
+                self.add_lights(bsdf, &mut image);
+                (image, if whole { lobe.weights } else { difference(&lobe.weights, &without) })
             }
-            None if whole => {}
-            None => return planes,
+            None if whole => (self.black(), without),
+            None => return self.black(),
+        };
+        if whole {
+            self.returned.add_baked(bsdf.diffuse(), &mut planes);
         }
         self.returned.add(&weights, bsdf.diffuse(), &mut planes);
         planes
@@ -357,12 +358,6 @@ impl Scene {
             scene.meshes.iter_mut().for_each(|m| m.diffuse = None);
         }
         scene
-    }
-}
-
-fn add(planes: &mut Planes, more: &Planes) {
-    for (plane, more) in planes.iter_mut().zip(more) {
-        plane.iter_mut().zip(more).for_each(|(sum, v)| *sum += v);
     }
 }
 

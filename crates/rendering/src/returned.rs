@@ -46,12 +46,13 @@ impl Returned {
         Self { planes, own, white, has_own }
     }
 
-    /// The baked light for an albedo.
-    pub(crate) fn baked(&self, albedo: [f64; 3]) -> Planes {
-        std::array::from_fn(|c| {
+    /// Adds the baked light for an albedo to planes of pixels.
+    pub(crate) fn add_baked(&self, albedo: [f64; 3], planes: &mut Planes) {
+        for c in 0..3 {
             let albedo = albedo[c] as f32;
-            self.own[c].iter().zip(&self.white[c]).map(|(own, white)| own + albedo * white).collect()
-        })
+            let light = self.own[c].iter().zip(&self.white[c]).map(|(own, white)| own + albedo * white);
+            planes[c].iter_mut().zip(light).for_each(|(sum, v)| *sum += v);
+        }
     }
 
     /// Adds it to planes of pixels, for an albedo and the modes' weights.

@@ -123,7 +123,13 @@ fn planes(bundles: &[Bundle], lobes: &[&Lobe]) -> Vec<Planes> {
     let plane = |m: usize, c: usize| -> Vec<f32> {
         let products = blocks.iter().flat_map(|block| block.iter().skip(m).step_by(lobes.len()));
         let mut plane = Vec::with_capacity(bundles.len() * LANES);
-        bundles.iter().zip(products).for_each(|(b, p)| plane.extend_from_slice(&p[c][..b.len]));
+        for (bundle, product) in bundles.iter().zip(products) {
+            // Most bundles are full: a copy of known size.
+            match bundle.len {
+                LANES => plane.extend_from_slice(&product[c]),
+                len => plane.extend_from_slice(&product[c][..len]),
+            }
+        }
         plane
     };
     (0..lobes.len()).into_par_iter().map(|m| std::array::from_fn(|c| plane(m, c))).collect()
@@ -132,13 +138,12 @@ fn planes(bundles: &[Bundle], lobes: &[&Lobe]) -> Vec<Planes> {
 /// The products of some bundles with all lobes, lobe by lobe for each bundle.
 fn block(bundles: &[Bundle], lobes: &[&Lobe]) -> Vec<[Lanes; 3]> {
     let mut products = vec![[[0.0; LANES]; 3]; bundles.len() * lobes.len()];
-    let mut coefficients = Vec::new();
+    let mut coefficients = vec![[[0.0; 3]; ROW]; lobes.len()];
     let mut theta = f64::NAN;
     for (bundle, out) in bundles.iter().zip(products.chunks_mut(lobes.len().max(1))) {
         if bundle.theta != theta {
             theta = bundle.theta;
-            coefficients.clear();
-            coefficients.extend(lobes.iter().map(|lobe| lobe.table.at(theta)));
+            lobes.iter().zip(&mut coefficients).for_each(|(lobe, out)| lobe.table.at(theta, out));
         }
         product::products(&bundle.moments, &coefficients, out);
         if let Some(reflected) = &bundle.reflected {
