@@ -15,10 +15,15 @@ const LAST_ANGLE: f64 = FRAC_PI_2 - 1e-3;
 /// They are the denser, the closer to grazing: the power by which their distance from it falls.
 const GRAZING: f64 = 1.5;
 /// Interpolation points on each ring.
-const POINTS: usize = 5;
-/// Quadrature points between two nodes, as fractions of their distance, and their weights (Gauss–Legendre).
-const GAUSS: [(f64, f64); 3] =
+const POINTS: usize = 4;
+/// Quadrature points between two of the innermost nodes, where lobes may be narrower than their distance: as fractions of it,
+/// with their weights (Gauss–Legendre), …
+const INNER_GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+/// … and between the others.
+const GAUSS: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+/// The first of the others: a degree and a half from the normal.
+const OUTER: usize = 8;
 
 /// The coefficients of one lobe at one angle of view, by basis function and channel.
 pub(crate) type Coefficients = [[f32; 3]; ROW];
@@ -154,7 +159,8 @@ static QUADRATURE: LazyLock<Quadrature> = LazyLock::new(|| {
     for angle in 0..ANGLES {
         let theta_o = tabulated_angle(angle);
         for interval in 0..NODES - 1 {
-            for (hat, share) in GAUSS {
+            let points: &[(f64, f64)] = if interval < OUTER { &INNER_GAUSS } else { &GAUSS };
+            for &(hat, share) in points {
                 quadrature.add_ring(SampledRing { angle, interval, hat }, theta_o, share);
             }
         }

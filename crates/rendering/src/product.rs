@@ -32,11 +32,27 @@ pub(crate) struct Reflected {
     pub(crate) board: [[Lanes; FUNCTION_TERMS]; NODES],
     /// Mean of each mode of the added irradiance over what a group of nodes sees of the checkerboard.
     pub(crate) modes: [[Lanes; MODES]; GROUPS],
+    /// The groups in which any of the rows sees the checkerboard: the others are passed over.
+    pub(crate) seen: [bool; GROUPS],
+}
+
+impl Reflected {
+    /// Finds out which groups see the checkerboard.
+    pub(crate) fn mark_seen(&mut self) {
+        let nodes = self.board.chunks_exact(GROUP);
+        for (seen, nodes) in self.seen.iter_mut().zip(nodes) {
+            *seen = nodes.as_flattened().as_flattened().iter().any(|moment| *moment != 0.0);
+        }
+    }
 }
 
 impl Default for Reflected {
     fn default() -> Self {
-        Self { board: [[[0.0; LANES]; FUNCTION_TERMS]; NODES], modes: [[[0.0; LANES]; MODES]; GROUPS] }
+        Self {
+            board: [[[0.0; LANES]; FUNCTION_TERMS]; NODES],
+            modes: [[[0.0; LANES]; MODES]; GROUPS],
+            seen: [false; GROUPS],
+        }
     }
 }
 
@@ -64,7 +80,7 @@ fn reflected_at<S: Simd>(
         let lanes = first..first + width;
         let load = |values: &Lanes| S::f32s::from_slice(simd, &values[lanes.clone()]);
         let mut sums: [S::f32s; 3] = std::array::from_fn(|c| load(&out[c]));
-        for group in 0..GROUPS {
+        for group in (0..GROUPS).filter(|group| reflected.seen[*group]) {
             let mut board = [S::f32s::splat(simd, 0.0); 3];
             for j in group * GROUP..(group + 1) * GROUP {
                 for k in 0..FUNCTION_TERMS {

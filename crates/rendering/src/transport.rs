@@ -172,6 +172,7 @@ impl Bundle {
                 (0..3).for_each(|c| moments[i][c][lane] = sum[c]);
             }
         }
+        reflected.iter_mut().for_each(|reflected| reflected.mark_seen());
         let mean = rows.iter().map(|row| row.theta).sum::<f64>() / rows.len() as f64;
         Self { theta: (mean / ANGLE_STEP).round() * ANGLE_STEP, len: rows.len(), moments, reflected }
     }
@@ -280,6 +281,9 @@ impl Flat for Box<Reflected> {
     }
 
     fn read(input: &mut Reader) -> io::Result<Self> {
-        Ok(Self::new(Reflected { board: input.value()?, modes: input.value()? }))
+        let mut reflected =
+            Self::new(Reflected { board: input.value()?, modes: input.value()?, ..Reflected::default() });
+        reflected.mark_seen();
+        Ok(reflected)
     }
 }
