@@ -146,11 +146,11 @@ fn block(bundles: &[Bundle], lobes: &[&Lobe]) -> Vec<[Lanes; 3]> {
             lobes.iter().zip(&mut coefficients).for_each(|(lobe, out)| lobe.table.at(theta, out));
         }
         product::products(&bundle.moments, &coefficients, out);
-        if let Some(reflected) = &bundle.reflected {
-            for ((coefficients, lobe), out) in coefficients.iter().zip(lobes).zip(out) {
-                if !lobe.is_isotropic {
-                    *out = [[0.0; LANES]; 3];
-                }
+        for ((coefficients, lobe), out) in coefficients.iter().zip(lobes).zip(out) {
+            if !lobe.is_isotropic {
+                *out = [[0.0; LANES]; 3];
+            }
+            if let Some(reflected) = &bundle.reflected {
                 product::add_reflected(reflected, coefficients, &lobe.weights, out);
             }
         }

@@ -103,8 +103,14 @@ fn swapped_widths_turn_the_highlight() {
 
 #[test]
 fn a_hardly_anisotropic_lobe_is_an_isotropic_one() {
-    for illumination in [Illumination::Point, Illumination::Environment] {
-        let renderer = Renderer::prepare(&Scene::reference(), illumination, 64).unwrap();
+    let without_plane = Scene { plane: None, ..Scene::reference() };
+    let cases = [
+        (Scene::reference(), Illumination::Point),
+        (Scene::reference(), Illumination::Environment),
+        (without_plane, Illumination::Environment),
+    ];
+    for (scene, illumination) in cases {
+        let renderer = Renderer::prepare(&scene, illumination, 64).unwrap();
         let [a, b] = ["ggx:roughness=0.2", "ggx:roughness_u=0.2,roughness_v=0.200001"]
             .map(|text| renderer.render(&material(text), Part::Full));
         let sum: f32 =
