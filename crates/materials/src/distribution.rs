@@ -33,11 +33,17 @@ impl Distribution {
     /// Density D of normals at the half vector, in 1/sr.
     #[inline(always)]
     pub fn density<T: Real>(&self, g: &Geometry<T>) -> T {
+        self.density_at(g.cos_h, g.tan2_h)
+    }
+
+    /// Density D of normals at `cos θ_h` and `tan²θ_h` along tangent and bitangent, in 1/sr.
+    #[inline(always)]
+    pub fn density_at<T: Real>(&self, cos_h: T, tan2_h: [T; 2]) -> T {
         let [ax, ay] = self.alpha.map(T::of);
-        let cos2 = g.cos_h * g.cos_h;
+        let cos2 = cos_h * cos_h;
         // (hx/αx)² + (hy/αy)² over hz²; multiplied, because a division costs as much as all the rest.
         let [over_x, over_y] = self.alpha.map(|a| T::of(1.0 / (a * a)));
-        let slope2 = g.tan2_h[0] * over_x + g.tan2_h[1] * over_y;
+        let slope2 = tan2_h[0] * over_x + tan2_h[1] * over_y;
         match self.shape {
             Shape::Ggx => {
                 let t = cos2 * (T::one() + slope2);
@@ -46,9 +52,8 @@ impl Distribution {
             Shape::Beckmann => (-slope2).exp() / (T::of(PI) * ax * ay * cos2 * cos2),
             Shape::Phong => {
                 let [eu, ev] = self.exponents().map(T::of);
-                let tan2 = g.tan2_h[0] + g.tan2_h[1];
-                let exponent =
-                    if tan2 > T::zero() { (eu * g.tan2_h[0] + ev * g.tan2_h[1]) / tan2 } else { eu };
+                let tan2 = tan2_h[0] + tan2_h[1];
+                let exponent = if tan2 > T::zero() { (eu * tan2_h[0] + ev * tan2_h[1]) / tan2 } else { eu };
                 // cos^e θ = (1 + tan² θ)^(−e/2), which keeps its digits near θ = 0 where cos θ rounds to 1.
                 let power = (-T::of(0.5) * exponent * tan2.ln_1p()).exp();
                 ((eu + T::of(2.0)) * (ev + T::of(2.0))).sqrt() * T::of(1.0 / TAU) * power

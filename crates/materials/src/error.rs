@@ -27,6 +27,48 @@ pub enum MaterialError {
         /// All parameters and aliases of the model.
         known: String,
     },
+    /// The model has no named material of that name.
+    #[error("model '{model}' has no preset '{name}'{}; `lookmatch models {model}` lists its {count}", hint(.nearest))]
+    UnknownPreset {
+        /// Name of the model.
+        model: String,
+        /// As given.
+        name: String,
+        /// The closest known name.
+        nearest: Option<String>,
+        /// How many the model has.
+        count: usize,
+    },
+    /// Values that do not go together.
+    #[error("parameters of model '{model}' do not go together: {reason}")]
+    Inconsistent {
+        /// Name of the model.
+        model: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A file that is needed and not given.
+    #[error("model '{model}' needs {name}=PATH: {content}")]
+    NoFile {
+        /// Name of the model.
+        model: String,
+        /// Name of the parameter.
+        name: String,
+        /// What the file has to hold.
+        content: String,
+    },
+    /// A file that cannot be used.
+    #[error("cannot use '{path}' as {name} of model '{model}': {reason}")]
+    BadFile {
+        /// Name of the model.
+        model: String,
+        /// Name of the parameter.
+        name: String,
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A value outside of what the model is defined for.
     #[error("parameter '{name}' of model '{model}' is {value}, outside its range {range}")]
     OutOfRange {

@@ -23,12 +23,14 @@ mod model;
 pub mod models;
 mod parameter;
 mod real;
+mod sampling;
 
-pub use bsdf::{Bsdf, Lobe, Sampling};
+pub use bsdf::{Bsdf, Lobe};
 pub use error::MaterialError;
 pub use geometry::Geometry;
-pub use material::{Material, Value};
-pub use model::{Alias, Model, Values};
+pub use material::{Material, MeasuredFile, Value};
+pub use model::{Alias, Family, Model, Named, Preset, Values};
 pub use models::{by_name, registry};
-pub use parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
+pub use parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale, Trend};
 pub use real::Real;
+pub use sampling::{Sampling, Technique};

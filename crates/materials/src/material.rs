@@ -1,18 +1,72 @@
 //! A model with a value for each parameter, as text, as JSON, and as a BSDF.
 
+use std::path::Path;
+use std::sync::Arc;
+
 use serde_json::{Map, Value as Json};
 
+use crate::error::nearest;
+use crate::model::Named;
 use crate::{Bsdf, Kind, MaterialError, Model, Role, Values, by_name};
 
 /// The value of one parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// One number.
     Number(f64),
     /// Linear RGB.
     Colour([f64; 3]),
+    /// A number for each lobe.
+    List(Arc<[f64]>),
     /// The name of a formula.
     Choice(&'static str),
+    /// A file of measurements.
+    File(MeasuredFile),
+}
+
+impl Value {
+    /// The number, the first of a list, or the mean of a colour; `None` for a choice or a file.
+    pub fn mean(&self) -> Option<f64> {
+        match self {
+            Self::Number(v) => Some(*v),
+            Self::List(v) => v.first().copied(),
+            Self::Colour([r, g, b]) => Some(if r == g && g == b { *r } else { (r + g + b) / 3.0 }),
+            Self::Choice(_) | Self::File(_) => None,
+        }
+    }
+
+    /// What the value consists of, as numbers that tell it from all others of its parameter.
+    pub fn bits(&self) -> Vec<u64> {
+        let text = |text: &str| text.bytes().map(u64::from).collect();
+        match self {
+            Self::Number(v) => vec![v.to_bits()],
+            Self::Colour(c) => c.map(f64::to_bits).to_vec(),
+            Self::List(v) => v.iter().map(|v| v.to_bits()).collect(),
+            Self::Choice(name) => text(name),
+            Self::File(file) => text(&file.path),
+        }
+    }
+}
+
+/// A file of measurements and what was read from it.
+#[derive(Clone)]
+pub struct MeasuredFile {
+    /// The file, as it was given; empty where none was.
+    pub path: Arc<str>,
+    /// Its material; `None` where no file was given.
+    pub(crate) bsdf: Option<Arc<dyn Bsdf>>,
+}
+
+impl PartialEq for MeasuredFile {
+    fn eq(&self, other: &Self) -> bool {
+        self.path == other.path
+    }
+}
+
+impl std::fmt::Debug for MeasuredFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.path.fmt(f)
+    }
 }
 
 /// A material: a model and the values of all its parameters, each within its range.
@@ -34,13 +88,15 @@ impl Material {
         let default = |kind: &Kind| match kind {
             Kind::Number { default, .. } => Value::Number(*default),
             Kind::Colour { default, .. } => Value::Colour(*default),
+            Kind::List { default, .. } => Value::List((*default).into()),
             Kind::Choice { options } => Value::Choice(options[0]),
+            Kind::File { .. } => Value::File(MeasuredFile { path: "".into(), bsdf: None }),
         };
         Self { model, values: model.parameters.iter().map(|p| default(&p.kind)).collect() }
     }
 
-    /// Reads `MODEL:NAME=VALUE,…` or a JSON object with a `model` field. Parameters that are not named keep their
-    /// defaults; a colour is `0.1/0.3/0.1` (JSON: an array) or one number for grey.
+    /// Reads `MODEL[@PRESET][:NAME=VALUE,…]` or a JSON object with a `model` field. Parameters that are not named keep the
+    /// preset's values or their defaults; a colour is `0.1/0.3/0.1` (JSON: an array) or one number for grey.
     pub fn parse(text: &str) -> Result<Self, MaterialError> {
         let text = text.trim();
         if text.starts_with('{') {
@@ -48,13 +104,45 @@ impl Material {
             return Self::from_json(&json);
         }
         let (name, list) = text.split_once(':').unwrap_or((text, ""));
-        let mut assignment = Assignment::new(Self::new(by_name(name.trim())?));
+        let mut assignment = Assignment::new(Self::named(name.trim())?);
         for item in list.split(',').map(str::trim).filter(|item| !item.is_empty()) {
             let (name, value) =
                 item.split_once('=').ok_or_else(|| syntax(text, format!("'{item}' is not NAME=VALUE")))?;
             assignment.set(name.trim(), value.trim())?;
         }
-        Ok(assignment.material)
+        assignment.material.checked()
+    }
+
+    /// The material that `MODEL` or `MODEL@PRESET` stands for; files of measurements may still be missing.
+    pub fn named(text: &str) -> Result<Self, MaterialError> {
+        let (model, preset) = match text.split_once('@') {
+            Some((model, preset)) => (by_name(model)?, Some(preset)),
+            None => (by_name(text)?, None),
+        };
+        let mut material = Self::new(model);
+        for (name, value) in preset.map(|p| model.preset(p)).transpose()?.iter().flat_map(|p| &p.values) {
+            material.set(name, value)?;
+        }
+        Ok(material)
+    }
+
+    /// The material, once its values are known to go together.
+    ///
+    /// # Errors
+    /// [`MaterialError::NoFile`] and [`MaterialError::Inconsistent`].
+    pub fn checked(self) -> Result<Self, MaterialError> {
+        for (parameter, value) in self.model.parameters.iter().zip(&self.values) {
+            if let (Kind::File { content }, Value::File(MeasuredFile { bsdf: None, .. })) =
+                (parameter.kind, value)
+            {
+                let (model, name) = (self.model.name.to_owned(), parameter.name.to_owned());
+                return Err(MaterialError::NoFile { model, name, content: content.to_owned() });
+            }
+        }
+        let together = (self.model.check)(&Values { model: self.model, values: &self.values });
+        let model = || self.model.name.to_owned();
+        together.map_err(|reason| MaterialError::Inconsistent { model: model(), reason })?;
+        Ok(self)
     }
 
     /// Reads `{"model": "ward", "diffuse": [0.1, 0.3, 0.1], "roughness": 0.2}`.
@@ -65,7 +153,7 @@ impl Material {
             .get("model")
             .and_then(Json::as_str)
             .ok_or_else(|| syntax(&text(), "the field 'model' is missing".into()))?;
-        let mut assignment = Assignment::new(Self::new(by_name(name)?));
+        let mut assignment = Assignment::new(Self::named(name)?);
         for (name, value) in object.iter().filter(|(name, _)| *name != "model") {
             let value = match value {
                 Json::String(s) => s.clone(),
@@ -74,7 +162,7 @@ impl Material {
             };
             assignment.set(name, &value)?;
         }
-        Ok(assignment.material)
+        assignment.material.checked()
     }
 
     /// The JSON form, every parameter named.
@@ -85,7 +173,9 @@ impl Material {
             let json = match value {
                 Value::Number(v) => Json::from(*v),
                 Value::Colour(c) => Json::from(c.to_vec()),
+                Value::List(v) => Json::from(v.to_vec()),
                 Value::Choice(name) => Json::from(*name),
+                Value::File(file) => Json::from(&*file.path),
             };
             object.insert(parameter.name.into(), json);
         }
@@ -104,19 +194,28 @@ impl Material {
 
     /// Sets a parameter (or all behind an alias) to a value written as text.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), MaterialError> {
-        for index in self.model.resolve(name)? {
+        let indices = self.model.resolve(name)?;
+        if let Some(named) = self.model.named.iter().find(|n| n.name == name) {
+            let values = (named.look_up)(text).ok_or_else(|| unknown_word(self.model, named, text))?;
+            return indices
+                .into_iter()
+                .zip(values)
+                .try_for_each(|(index, value)| self.set_value(index, value));
+        }
+        for index in indices {
             self.values[index] = self.check(index, parse_value(self.model, index, text)?)?;
         }
         Ok(())
     }
 
-    /// Sets a parameter (or all behind an alias) to a number; a colour becomes grey.
+    /// Sets a parameter (or all behind an alias) to a number; a colour becomes grey, a list gets one lobe.
     pub fn set_number(&mut self, name: &str, value: f64) -> Result<(), MaterialError> {
         for index in self.model.resolve(name)? {
             let parsed = match self.model.parameters[index].kind {
                 Kind::Number { .. } => Value::Number(value),
                 Kind::Colour { .. } => Value::Colour([value; 3]),
-                Kind::Choice { .. } => {
+                Kind::List { .. } => Value::List([value].into()),
+                Kind::Choice { .. } | Kind::File { .. } => {
                     return Err(bad_value(self.model, index, &value.to_string()));
                 }
             };
@@ -131,24 +230,34 @@ impl Material {
         Ok(())
     }
 
-    /// The number behind a name: the first channel of a colour, the first parameter of an alias.
+    /// The number behind a name: the first channel of a colour, the first of a list, the first parameter of an alias.
     pub fn number(&self, name: &str) -> Result<f64, MaterialError> {
         let index = self.model.resolve(name)?[0];
-        match self.values[index] {
-            Value::Number(v) => Ok(v),
+        match &self.values[index] {
+            Value::Number(v) => Ok(*v),
             Value::Colour(c) => Ok(c[0]),
-            Value::Choice(name) => Err(bad_value(self.model, index, name)),
+            Value::List(v) if !v.is_empty() => Ok(v[0]),
+            other => Err(bad_value(self.model, index, &show(other))),
         }
     }
 
     /// The value of the first parameter with a role.
     pub fn by_role(&self, role: Role) -> Option<Value> {
-        self.model.parameters.iter().position(|p| p.role == role).map(|i| self.values[i])
+        self.model.parameters.iter().position(|p| p.role == role).map(|i| self.values[i].clone())
     }
 
-    /// The material without its specular lobe: every specular reflectance set to 0 (Guarnera *et al.* 2018, 3.1).
+    /// The material with its diffuse reflection alone (Guarnera *et al.* 2018, 3.1): every specular reflectance set to 0, or
+    /// what [`Model::diffuse_only`] says.
     pub fn diffuse_only(&self) -> Self {
         let mut copy = self.clone();
+        if let Some(bare) = self.model.diffuse_only {
+            for (name, value) in bare(&Values { model: self.model, values: &self.values }) {
+                if let Some(index) = self.model.parameters.iter().position(|p| p.name == name) {
+                    copy.values[index] = value;
+                }
+            }
+            return copy;
+        }
         for (parameter, value) in self.model.parameters.iter().zip(&mut copy.values) {
             if parameter.role == Role::SpecularReflectance {
                 *value = match value {
@@ -170,7 +279,8 @@ impl Material {
         let numbers: &[f64] = match &value {
             Value::Number(v) => std::slice::from_ref(v),
             Value::Colour(c) => c,
-            Value::Choice(_) => &[],
+            Value::List(v) => v,
+            Value::Choice(_) | Value::File(_) => &[],
         };
         match parameter.range() {
             Some(range) if !numbers.iter().all(|v| range.valid.contains(*v)) => {
@@ -243,9 +353,35 @@ fn parse_value(model: &'static Model, index: usize, text: &str) -> Result<Value,
             Some([r, g, b]) => Some(Value::Colour([*r, *g, *b])),
             _ => None,
         },
+        Kind::List { .. } => numbers().map(|v| Value::List(v.into())),
         Kind::Choice { options } => options.iter().find(|o| **o == text).map(|o| Value::Choice(o)),
+        Kind::File { .. } => return load(model, index, text),
     };
     parsed.ok_or_else(|| bad_value(model, index, text))
+}
+
+/// Reads a file of measurements.
+fn load(model: &'static Model, index: usize, path: &str) -> Result<Value, MaterialError> {
+    let loaded = match model.load {
+        Some(load) => load(Path::new(path)),
+        None => Err("the model reads no files".to_owned()),
+    };
+    let bsdf = loaded.map_err(|reason| MaterialError::BadFile {
+        model: model.name.to_owned(),
+        name: model.parameters[index].name.to_owned(),
+        path: path.to_owned(),
+        reason,
+    })?;
+    Ok(Value::File(MeasuredFile { path: path.into(), bsdf: Some(bsdf) }))
+}
+
+fn unknown_word(model: &Model, named: &Named, word: &str) -> MaterialError {
+    let words = (named.words)();
+    let hint =
+        nearest(word, words.iter().copied()).map(|n| format!(" (did you mean '{n}'?)")).unwrap_or_default();
+    let (model, name) = (model.name.to_owned(), named.name.to_owned());
+    let expected = format!("one of {}{hint}", words.join(", "));
+    MaterialError::BadValue { model, name, value: word.to_owned(), expected }
 }
 
 fn bad_value(model: &'static Model, index: usize, value: &str) -> MaterialError {
@@ -253,7 +389,13 @@ fn bad_value(model: &'static Model, index: usize, value: &str) -> MaterialError 
     let expected = match &parameter.kind {
         Kind::Number { range, .. } => format!("a number in {}", range.valid),
         Kind::Colour { range, .. } => format!("a number or R/G/B, each in {}", range.valid),
-        Kind::Choice { options } => format!("one of {}", options.join(", ")),
+        Kind::List { range, .. } => format!("a number for each lobe, A/B/..., each in {}", range.valid),
+        Kind::Choice { options } => {
+            let hint = nearest(value, options.iter().copied());
+            let hint = hint.map(|n| format!(" (did you mean '{n}'?)")).unwrap_or_default();
+            format!("one of {}{hint}", options.join(", "))
+        }
+        Kind::File { content } => content.to_string(),
     };
     let (model, name) = (model.name.to_owned(), parameter.name.to_owned());
     MaterialError::BadValue { model, name, value: value.to_owned(), expected }
@@ -268,7 +410,9 @@ fn show(value: &Value) -> String {
         Value::Number(v) => v.to_string(),
         Value::Colour([r, g, b]) if r == g && g == b => r.to_string(),
         Value::Colour([r, g, b]) => format!("{r}/{g}/{b}"),
+        Value::List(v) => v.iter().map(f64::to_string).collect::<Vec<_>>().join("/"),
         Value::Choice(name) => (*name).to_owned(),
+        Value::File(file) => file.path.to_string(),
     }
 }
 
@@ -289,11 +433,11 @@ mod tests {
 
     #[test]
     fn every_model_survives_a_round_trip() {
-        for model in registry() {
+        for model in registry().iter().filter(|m| m.load.is_none()) {
             let material = Material::new(model);
             assert_eq!(Material::parse(&material.to_string()).unwrap(), material);
             assert_eq!(Material::from_json(&material.to_json()).unwrap(), material);
-            assert!(material.values().iter().enumerate().all(|(i, v)| material.check(i, *v).is_ok()));
+            assert!(material.values().iter().enumerate().all(|(i, v)| material.check(i, v.clone()).is_ok()));
         }
     }
 

@@ -3,10 +3,11 @@
 //! `f = k_s F D G / (4 cos θ_i cos θ_o)` (Torrance & Sparrow 1967; Walter *et al.* 2007, eq. 20), beside an
 //! uncoupled Lambert term.
 
-use crate::distribution::Distribution;
+use crate::conformance::Parameters;
+use crate::distribution::{Distribution, Shape};
 use crate::fresnel::Fresnel;
 use crate::masking::Masking;
-use crate::{Geometry, Lobe, Real, Sampling};
+use crate::{Bsdf, Geometry, Lobe, Real, Sampling};
 
 /// A microfacet lobe with its Lambert term.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +46,32 @@ impl Lobe for Microfacet {
     }
 
     fn sampling(&self) -> Option<Sampling> {
-        (self.specular != [0.0; 3]).then_some(Sampling { distribution: self.distribution })
+        (self.specular != [0.0; 3]).then(|| Sampling::half_vector(self.distribution))
     }
+}
+
+/// The BSDF of a conformance vector: any combination of terms.
+pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+    let shape = match p.text("dist")? {
+        "ggx" => Shape::Ggx,
+        "beckmann" => Shape::Beckmann,
+        "phong" => Shape::Phong,
+        _ => return None,
+    };
+    let masking = match p.text("g")? {
+        "smith_sep" => Masking::Separable,
+        "smith_hc" => Masking::Correlated,
+        "smith_sep_rational" => Masking::SeparableRational,
+        "smith_hc_rational" => Masking::CorrelatedRational,
+        "vgroove" => Masking::VGroove,
+        "one" => Masking::One,
+        _ => return None,
+    };
+    Some(Box::new(Microfacet {
+        diffuse: [p.number_or("kd", 0.0)?; 3],
+        specular: [p.number_or("ks", 1.0)?; 3],
+        distribution: Distribution { shape, alpha: [p.number("ax")?, p.number("ay")?] },
+        masking,
+        fresnel: [p.fresnel()?; 3],
+    }))
 }

@@ -1,5 +1,8 @@
 //! A material model: its description and how to build its BSDF.
 
+use std::path::Path;
+use std::sync::Arc;
+
 use serde::Serialize;
 
 use crate::error::nearest;
@@ -15,6 +18,46 @@ pub struct Alias {
     pub parameters: &'static [&'static str],
 }
 
+/// A second name that sets several parameters to what a table says of a word: `conductor=gold`.
+#[derive(Clone, Copy, Serialize)]
+pub struct Named {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// The parameters that it sets.
+    pub parameters: &'static [&'static str],
+    /// One sentence, with the source of the values.
+    pub summary: &'static str,
+    /// The words that it knows.
+    #[serde(skip)]
+    pub words: fn() -> Vec<&'static str>,
+    /// The values of a word, in the order of `parameters`.
+    #[serde(skip)]
+    pub look_up: fn(&str) -> Option<Vec<Value>>,
+}
+
+/// A material with a name of its own: `low-abc@chrome`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Preset {
+    /// Name after the `@`.
+    pub name: String,
+    /// Where the values come from, with their licence.
+    pub source: &'static str,
+    /// Parameters as they would be written: name and value.
+    pub values: Vec<(&'static str, String)>,
+}
+
+/// Where a model comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Family {
+    /// Formulas of the literature.
+    Classic,
+    /// What today's renderers and file formats specify.
+    Production,
+    /// Measured materials.
+    Measured,
+}
+
 /// A family of materials.
 #[derive(Serialize)]
 pub struct Model {
@@ -24,8 +67,10 @@ pub struct Model {
     pub title: &'static str,
     /// One sentence on what it is good for.
     pub summary: &'static str,
-    /// Authors, year, equation.
+    /// Authors, year, equation; name and version of a specification.
     pub reference: &'static str,
+    /// Where it comes from.
+    pub family: Family,
     /// True where the lobe's reflectance grows towards grazing angles.
     pub has_fresnel: bool,
     /// True where light and viewer may be swapped.
@@ -36,13 +81,53 @@ pub struct Model {
     pub parameters: &'static [Parameter],
     /// Second names.
     pub aliases: &'static [Alias],
+    /// Second names with tables.
+    pub named: &'static [Named],
     /// The parameters or aliases that a remap tabulates by default when the model is the source.
     pub surveyed: &'static [&'static str],
-    /// The parameters or aliases that a remap searches by default when the model is the target.
+    /// The parameters or aliases that a remap searches by default when the model is the target; none where the model can
+    /// only be a source.
     pub searched: &'static [&'static str],
+    /// Materials with names of their own.
+    #[serde(skip)]
+    pub presets: fn() -> &'static [Preset],
+    /// What takes everything but the diffuse reflection from a material, as values of parameters; `None` where a specular
+    /// reflectance of 0 does.
+    #[serde(skip)]
+    pub diffuse_only: Option<fn(&Values) -> Vec<(&'static str, Value)>>,
+    /// What values must fulfil together, beyond the range of each; an error says what is wrong.
+    #[serde(skip)]
+    pub check: fn(&Values) -> Result<(), String>,
+    /// Reads a file of measurements, for models with a parameter of that kind; an error says what is wrong.
+    #[serde(skip)]
+    pub load: Option<fn(&Path) -> Result<Arc<dyn Bsdf>, String>>,
     /// Builds the BSDF of checked values.
     #[serde(skip)]
     pub build: fn(&Values) -> Box<dyn Bsdf>,
+}
+
+impl Model {
+    /// What most models have in common, to be completed: `Model { name: …, build: …, ..Model::BLANK }`.
+    pub const BLANK: Self = Self {
+        name: "",
+        title: "",
+        summary: "",
+        reference: "",
+        family: Family::Classic,
+        has_fresnel: true,
+        is_reciprocal: true,
+        conserves_energy: false,
+        parameters: &[],
+        aliases: &[],
+        named: &[],
+        surveyed: &[],
+        searched: &[],
+        presets: || &[],
+        diffuse_only: None,
+        check: |_| Ok(()),
+        load: None,
+        build: |_| Box::new(crate::models::lambert::Lambert { diffuse: [0.0; 3] }),
+    };
 }
 
 impl Model {
@@ -52,8 +137,10 @@ impl Model {
         if let Some(index) = position(name) {
             return Ok(vec![index]);
         }
-        if let Some(alias) = self.aliases.iter().find(|a| a.name == name) {
-            return Ok(alias.parameters.iter().filter_map(|p| position(p)).collect());
+        let alias = self.aliases.iter().find(|a| a.name == name).map(|a| a.parameters);
+        let named = self.named.iter().find(|n| n.name == name).map(|n| n.parameters);
+        if let Some(parameters) = alias.or(named) {
+            return Ok(parameters.iter().filter_map(|p| position(p)).collect());
         }
         Err(MaterialError::UnknownParameter {
             model: self.name.to_owned(),
@@ -68,9 +155,24 @@ impl Model {
         self.resolve(name).map(|indices| &self.parameters[indices[0]])
     }
 
-    /// Names of all parameters, then of all aliases.
+    /// Names of all parameters, then of all aliases and tables.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
-        self.parameters.iter().map(|p| p.name).chain(self.aliases.iter().map(|a| a.name))
+        let named = self.named.iter().map(|n| n.name);
+        self.parameters.iter().map(|p| p.name).chain(self.aliases.iter().map(|a| a.name)).chain(named)
+    }
+
+    /// The named material of a model.
+    ///
+    /// # Errors
+    /// [`MaterialError::UnknownPreset`] with the nearest name.
+    pub fn preset(&self, name: &str) -> Result<&'static Preset, MaterialError> {
+        let presets = (self.presets)();
+        presets.iter().find(|p| p.name == name).ok_or_else(|| MaterialError::UnknownPreset {
+            model: self.name.to_owned(),
+            name: name.to_owned(),
+            nearest: nearest(name, presets.iter().map(|p| p.name.as_str())),
+            count: presets.len(),
+        })
     }
 }
 
@@ -96,6 +198,22 @@ impl Values<'_> {
         match self.get(name) {
             Some(Value::Number(v)) => *v,
             _ => f64::NAN,
+        }
+    }
+
+    /// The numbers of a list; empty where the model has no such list, which its own tests catch.
+    pub fn list(&self, name: &str) -> &[f64] {
+        match self.get(name) {
+            Some(Value::List(v)) => v,
+            _ => &[],
+        }
+    }
+
+    /// What was read from a file; `None` where no file was given.
+    pub fn file(&self, name: &str) -> Option<Arc<dyn Bsdf>> {
+        match self.get(name) {
+            Some(Value::File(file)) => file.bsdf.clone(),
+            _ => None,
         }
     }
 

@@ -29,24 +29,48 @@ fn assert_close(value: f64, reference: f64, rtol: f64, what: &Json) {
     assert!(error <= rtol * reference.abs() + 1e-12, "{value} instead of {reference}: {what}");
 }
 
+/// One number or three.
+fn channels(json: &Json) -> [f64; 3] {
+    json.as_f64().map_or_else(|| vec3(json), |grey| [grey; 3])
+}
+
+/// Models that need integrals hold to this in double precision; closed forms to 1e-9.
+const INTEGRALS: f64 = 1e-6;
+
 #[test]
 fn brdf_vectors_hold_in_both_precisions() {
     let Some(vectors) = vectors() else { return };
-    let mut checked = std::collections::BTreeMap::new();
+    let mut failures = std::collections::BTreeMap::new();
     for v in vectors["brdf"].as_array().unwrap() {
-        let model = v["model"].as_str().unwrap();
-        let Some(bsdf) = conformance::bsdf(model, v["params"].as_object().unwrap()) else {
-            continue;
-        };
-        let (wi, wo, reference) = (vec3(&v["wi"]), vec3(&v["wo"]), v["f"].as_f64().unwrap());
-        assert_close(bsdf.evaluate(wi, wo)[0], reference, 1e-9, v);
-        let fast = f64::from(bsdf.evaluate_f32(wi, wo)[0]);
-        // Far out in a Gaussian tail f underflows in single precision: nothing that a picture could show.
-        assert!((fast - reference).abs() <= 1e-4 * reference + 1e-12, "{fast} instead of {reference}: {v}");
-        *checked.entry(model.to_owned()).or_insert(0) += 1;
+        if let Err(message) = check(v) {
+            failures.entry(v["model"].to_string()).or_insert_with(Vec::new).push(message);
+        }
     }
-    let counts: Vec<_> = checked.iter().map(|(m, n)| (m.as_str(), *n)).collect();
-    assert_eq!(counts, [("lambert", 54), ("microfacet", 182), ("ward", 104)]);
+    for (model, messages) in &failures {
+        eprintln!("{model}: {} fail, for instance {}", messages.len(), messages[0]);
+    }
+    assert!(failures.is_empty());
+}
+
+fn check(v: &Json) -> Result<(), String> {
+    let bsdf = conformance::bsdf(v["model"].as_str().unwrap(), v["params"].as_object().unwrap());
+    let bsdf = bsdf.ok_or_else(|| format!("no model for {v}"))?;
+    let (wi, wo, reference) = (vec3(&v["wi"]), vec3(&v["wo"]), channels(&v["f"]));
+    let largest = reference.into_iter().fold(0.0, f64::max);
+    let close = |found: f64, c: usize, tolerance: f64, what: &str| {
+        let error = (found - reference[c]).abs();
+        let message =
+            || format!("{what}: {found} instead of {}, {:.1e} off: {v}", reference[c], error / largest);
+        if error <= tolerance * largest + 1e-12 { Ok(()) } else { Err(message()) }
+    };
+    let tolerance = if v["rtol"] == 1e-9 { 1e-9 } else { INTEGRALS };
+    let (exact, fast) = (bsdf.evaluate(wi, wo), bsdf.evaluate_f32(wi, wo));
+    for c in 0..3 {
+        close(exact[c], c, tolerance, "f64")?;
+        // Far out in a Gaussian tail f underflows in single precision: nothing that a picture could show.
+        close(f64::from(fast[c]), c, 1e-3, "f32")?;
+    }
+    Ok(())
 }
 
 #[test]

@@ -27,4 +27,5 @@ pub static MODEL: Model = Model {
     surveyed: &["roughness"],
     searched: &["roughness"],
     build: |v| Box::new(metal(Shape::Phong, v)),
+    ..Model::BLANK
 };

@@ -27,4 +27,5 @@ pub static MODEL: Model = Model {
     surveyed: &["ior", "roughness"],
     searched: &["specular", "ior", "roughness"],
     build: |v| Box::new(plastic(Shape::Beckmann, v)),
+    ..Model::BLANK
 };

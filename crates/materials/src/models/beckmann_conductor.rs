@@ -21,4 +21,5 @@ pub static MODEL: Model = Model {
     surveyed: &["roughness"],
     searched: &["roughness"],
     build: |v| Box::new(metal(Shape::Beckmann, v)),
+    ..Model::BLANK
 };

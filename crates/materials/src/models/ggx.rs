@@ -44,6 +44,7 @@ pub static MODEL: Model = Model {
     surveyed: &["ior", "roughness"],
     searched: &["specular", "ior", "roughness"],
     build: |v| Box::new(plastic(Shape::Ggx, v)),
+    ..Model::BLANK
 };
 
 /// The choice between a real interface and a constant reflectance.

@@ -29,6 +29,7 @@ pub static MODEL: Model = Model {
     surveyed: &["roughness"],
     searched: &["roughness"],
     build: |v| Box::new(metal(Shape::Ggx, v)),
+    ..Model::BLANK
 };
 
 /// The lobe of a metal with any distribution.

@@ -4,9 +4,10 @@
 //! |---|---|---|---|
 //! | `diffuse` | albedo, linear RGB | 0 to 1 | 0.5 |
 
+use crate::conformance::Parameters;
 use crate::model::Model;
 use crate::models::shared::DIFFUSE;
-use crate::{Geometry, Lobe, Real, Sampling};
+use crate::{Bsdf, Geometry, Lobe, Real, Sampling};
 
 /// The description of the model.
 pub static MODEL: Model = Model {
@@ -18,10 +19,10 @@ pub static MODEL: Model = Model {
     is_reciprocal: true,
     conserves_energy: true,
     parameters: &[DIFFUSE],
-    aliases: &[],
     surveyed: &["diffuse"],
     searched: &["diffuse"],
     build: |v| Box::new(Lambert { diffuse: v.colour("diffuse") }),
+    ..Model::BLANK
 };
 
 /// A Lambertian surface.
@@ -41,4 +42,9 @@ impl Lobe for Lambert {
     fn sampling(&self) -> Option<Sampling> {
         None
     }
+}
+
+/// The BSDF of a conformance vector.
+pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+    Some(Box::new(Lambert { diffuse: [p.number("kd")?; 3] }))
 }
