@@ -11,6 +11,7 @@
 //! This crate does no input or output.
 
 pub mod bsdf;
+mod canonical;
 pub mod conformance;
 pub mod distribution;
 mod error;
@@ -26,6 +27,7 @@ mod real;
 mod sampling;
 
 pub use bsdf::{Bsdf, Lobe};
+pub use canonical::Canonical;
 pub use error::MaterialError;
 pub use geometry::Geometry;
 pub use material::{Material, MeasuredFile, Value};

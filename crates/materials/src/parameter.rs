@@ -171,6 +171,14 @@ impl Interval {
     }
 }
 
+impl Interval {
+    /// The value inside that lies nearest to `value`; just above an excluded end.
+    pub fn nearest(&self, value: f64) -> f64 {
+        let least = if self.open { self.min + 1e-6 * (self.max - self.min) } else { self.min };
+        value.clamp(least, self.max)
+    }
+}
+
 impl std::fmt::Display for Interval {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}{}, {}]", if self.open { ']' } else { '[' }, self.min, self.max)

@@ -1,6 +1,6 @@
 //! Applying a probe to a material: interpolation between tabulated source points.
 
-use lookmatch_materials::{Kind, Material};
+use lookmatch_materials::{Kind, Material, Value};
 use lookmatch_search::Axis;
 use serde::Serialize;
 
@@ -78,9 +78,10 @@ pub fn apply(probe: &Probe, source: &Material, clamp: bool) -> Result<Applied, R
 fn axis_value(source: &Material, axis: &Axis) -> Result<f64, RemapError> {
     let model = source.model();
     let indices = model.resolve(&axis.name)?;
-    let grey = |i: &usize| match source.values()[*i] {
-        lookmatch_materials::Value::Number(v) => Some(v),
-        lookmatch_materials::Value::Colour([r, g, b]) if r == g && g == b => Some(r),
+    let grey = |i: &usize| match &source.values()[*i] {
+        Value::Number(v) => Some(*v),
+        Value::Colour([r, g, b]) if r == g && g == b => Some(*r),
+        Value::List(v) if v.len() == 1 => Some(v[0]),
         _ => None,
     };
     let values: Vec<Option<f64>> = indices.iter().map(grey).collect();
@@ -100,7 +101,7 @@ fn check_fixed(probe: &Probe, source: &Material) -> Result<(), RemapError> {
     let free: Vec<usize> =
         probe.source_axes.iter().map(|a| model.resolve(&a.name)).collect::<Result<Vec<_>, _>>()?.concat();
     for (index, parameter) in model.parameters.iter().enumerate() {
-        let (given, held) = (source.values()[index], probe.from.values()[index]);
+        let (given, held) = (&source.values()[index], &probe.from.values()[index]);
         let carried =
             [Role::DiffuseReflectance, Role::ConductorIndex, Role::Extinction].contains(&parameter.role);
         if !free.contains(&index) && !carried && given != held {

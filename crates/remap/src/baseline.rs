@@ -1,7 +1,6 @@
 //! What people do without a probe: rules that copy parameters by their names.
 
-use lookmatch_materials::fresnel::{f0_from_ior, ior_from_f0};
-use lookmatch_materials::{Material, Model, Role, Value};
+use lookmatch_materials::{Material, Model, Role};
 
 use crate::RemapError;
 use crate::plan::carry_over;
@@ -9,9 +8,9 @@ use crate::plan::carry_over;
 /// A rule that turns a source material into a target material without looking at either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Baseline {
-    /// Same roughness; the target's reflectance at normal incidence is the source's.
+    /// Same width of the lobe, in the microfacet α; the target's reflectance at normal incidence is the source's.
     Copy,
-    /// Same roughness; the target's Fresnel term is replaced by the source's constant reflectance, the rule of material
+    /// Same width; the target's Fresnel term is replaced by the source's constant reflectance, the rule of material
     /// distillers.
     CopyWithoutFresnel,
 }
@@ -36,74 +35,29 @@ impl Baseline {
     pub fn apply(self, source: &Material, fixed: &Material) -> Result<Option<Material>, RemapError> {
         let mut target = fixed.clone();
         carry_over(source, &mut target, &[])?;
-        copy_roughness(source, &mut target)?;
-        let (scale, f0) = reflectance(source);
+        let look = source.canonical();
+        if let Some(alpha) = look.alpha {
+            target.set_alpha(alpha)?;
+        }
+        // Both have a complex index, which was carried over: what is left is the scale of the lobe.
+        let shares_index = look.index.is_some() && target.by_role(Role::ConductorIndex).is_some();
+        let scale = source.by_role(Role::SpecularReflectance).and_then(|v| v.mean());
         match self {
-            Self::Copy => copy_reflectance(scale, f0, &mut target)?,
+            Self::Copy if shares_index => {
+                target.set_role(Role::SpecularReflectance, [scale.unwrap_or(1.0); 3])?;
+            }
+            Self::Copy => look.f0.map_or(Ok(()), |f0| target.set_f0(f0))?,
             Self::CopyWithoutFresnel => {
-                if !(has_choice(target.model(), "fresnel", "none") && f0.is_some()) {
+                let f0 = look.f0.filter(|_| look.index.is_none());
+                let (true, Some(f0)) = (has_choice(target.model(), "fresnel", "none"), f0) else {
                     return Ok(None);
-                }
+                };
                 target.set("fresnel", "none")?;
-                set_by_role(&mut target, Role::SpecularReflectance, f0.unwrap_or(0.0))?;
+                target.set_role(Role::SpecularReflectance, f0)?;
             }
         }
         Ok(Some(target))
     }
-}
-
-fn copy_roughness(source: &Material, target: &mut Material) -> Result<(), RemapError> {
-    let widths: Vec<Value> = source
-        .model()
-        .parameters
-        .iter()
-        .zip(source.values())
-        .filter(|(p, _)| p.role == Role::Roughness)
-        .map(|(_, v)| *v)
-        .collect();
-    let places: Vec<usize> = (0..target.values().len())
-        .filter(|i| target.model().parameters[*i].role == Role::Roughness)
-        .collect();
-    for (index, value) in places.into_iter().zip(widths) {
-        target.set_value(index, value)?;
-    }
-    Ok(())
-}
-
-/// The scale of a lobe, and its reflectance at normal incidence where it is that of a dielectric or has no Fresnel term.
-fn reflectance(source: &Material) -> (f64, Option<f64>) {
-    let number = |role| match source.by_role(role) {
-        Some(Value::Number(v)) => Some(v),
-        Some(Value::Colour([r, g, b])) => Some((r + g + b) / 3.0),
-        _ => None,
-    };
-    let scale = number(Role::SpecularReflectance).unwrap_or(1.0);
-    if number(Role::ConductorIndex).is_some() {
-        return (scale, None);
-    }
-    (scale, Some(scale * number(Role::RefractiveIndex).map_or(1.0, f0_from_ior)))
-}
-
-fn copy_reflectance(scale: f64, f0: Option<f64>, target: &mut Material) -> Result<(), RemapError> {
-    let has_index = target.by_role(Role::RefractiveIndex).is_some();
-    match f0 {
-        Some(f0) if has_index => {
-            set_by_role(target, Role::SpecularReflectance, if f0 > 0.0 { 1.0 } else { 0.0 })?;
-            // No index has F0 = 1 or 0; the closest that the target can hold.
-            set_by_role(target, Role::RefractiveIndex, ior_from_f0(f0.clamp(1e-6, 0.96)))
-        }
-        Some(f0) if target.by_role(Role::ConductorIndex).is_none() => {
-            set_by_role(target, Role::SpecularReflectance, f0)
-        }
-        _ => set_by_role(target, Role::SpecularReflectance, scale),
-    }
-}
-
-fn set_by_role(target: &mut Material, role: Role, value: f64) -> Result<(), RemapError> {
-    for parameter in target.model().parameters.iter().filter(|p| p.role == role) {
-        target.set_number(parameter.name, value)?;
-    }
-    Ok(())
 }
 
 fn has_choice(model: &Model, name: &str, option: &str) -> bool {

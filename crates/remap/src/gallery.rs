@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-use lookmatch_materials::{Material, Value};
+use lookmatch_materials::{Material, Role, Value};
 use lookmatch_search::{Objective, ObjectiveError, Point};
 use lru::LruCache;
 
@@ -14,20 +14,17 @@ use crate::{Plan, RemapError};
 /// Memory for kept appearances, in bytes.
 const CAPACITY: usize = 500 << 20;
 
-/// What a specular appearance depends on: the bits of every value; empty without a lobe. The diffuse reflectance is among
-/// them: what it throws onto the checkerboard is seen in the lobe.
+/// What an appearance depends on: the bits of every value, or those of the albedo where there is no more than that.
 pub(crate) type Key = Vec<u64>;
 
 pub(crate) fn key(material: &Material) -> Key {
-    if material.bsdf().sampling().is_none() {
-        return Key::new();
+    if material.by_role(Role::SpecularReflectance).is_some_and(|scale| scale.mean() == Some(0.0)) {
+        let bsdf = material.bsdf();
+        if bsdf.sampling().is_none() {
+            return bsdf.diffuse().map(f64::to_bits).to_vec();
+        }
     }
-    let bits = |value: &Value| match value {
-        Value::Number(v) => vec![v.to_bits()],
-        Value::Colour(c) => c.map(f64::to_bits).to_vec(),
-        Value::Choice(name) => name.bytes().map(u64::from).collect(),
-    };
-    material.values().iter().flat_map(bits).collect()
+    material.values().iter().flat_map(Value::bits).collect()
 }
 
 /// The most recently used target appearances.
@@ -50,12 +47,8 @@ impl<'a> Gallery<'a> {
         self.stage.appearance(source)
     }
 
-    /// Target materials at some points beside a source, with their appearances.
-    fn look(
-        &mut self,
-        source: &Material,
-        points: &[Point],
-    ) -> Result<Vec<(Material, Arc<Appearance>)>, RemapError> {
+    /// The appearances of target materials at some points beside a source.
+    fn look(&mut self, source: &Material, points: &[Point]) -> Result<Vec<Arc<Appearance>>, RemapError> {
         let materials = points
             .iter()
             .map(|p| self.plan.target_material(source, &self.lattice.values(p)))
@@ -76,7 +69,7 @@ impl<'a> Gallery<'a> {
             let new = fresh.iter().find(|(k, _)| k == key).map(|(_, appearance)| appearance.clone());
             let appearance = new.or_else(|| self.kept.get(key).cloned());
             let appearance = appearance.unwrap_or_else(|| Arc::new(self.stage.appearance(&material)));
-            seen.push((material, appearance));
+            seen.push(appearance);
         }
         for (key, appearance) in fresh {
             self.kept.put(key, appearance);
@@ -110,8 +103,7 @@ impl Objective for Match<'_, '_> {
         self.compared.extend(points.iter().cloned());
         let targets = self.gallery.look(self.source, points)?;
         let stage = self.gallery.stage;
-        let fitness =
-            |(m, a): &(Material, Arc<Appearance>)| stage.fitness((self.source, self.appearance), (m, a));
+        let fitness = |appearance: &Arc<Appearance>| stage.fitness(self.appearance, appearance);
         Ok(targets.par_iter().map(fitness).collect())
     }
 }

@@ -1,8 +1,8 @@
 //! What a remap does, in full: models, lattices, scene, metric, strategy, search and seed.
 
 use lookmatch_imaging::Fitness;
-use lookmatch_materials::fresnel::{f0_from_ior, ior_from_f0};
-use lookmatch_materials::{Levels, Material, Model, Role};
+use lookmatch_materials::fresnel::ior_from_f0;
+use lookmatch_materials::{Levels, Material, Model, Range, Role, Scale, Value};
 use lookmatch_rendering::Scene;
 use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
@@ -129,6 +129,12 @@ pub struct Plan {
 /// Sides of the reference pictures that can be compared: smaller ones show no highlight.
 const SIZES: std::ops::RangeInclusive<usize> = 16..=2048;
 
+/// Up to here an index of refraction is widened in equal steps: it stands for a reflectance of 0.4.
+const EQUAL_STEPS: f64 = 4.45;
+
+/// Step of the scale of a conductor that is to look like something else.
+const SCALE_STEP: f64 = 0.02;
+
 /// Levels of a source axis in a quick remap, at most.
 const QUICK_LEVELS: usize = 6;
 
@@ -139,8 +145,8 @@ impl Plan {
     /// An option that names a parameter of neither model, or a lattice outside a parameter's range.
     pub fn new(from: &'static Model, to: &'static Model, options: &Options) -> Result<Self, RemapError> {
         lookmatch_search::by_name(&options.search).map_err(|e| RemapError::Option(e.to_string()))?;
-        let mut source = Draft::new(from, from.surveyed, |r| r.survey)?;
-        let mut target = Draft::new(to, to.searched, |r| r.search)?;
+        let mut source = Draft::new(Material::new(from), from.surveyed, |r| r.survey)?;
+        let mut target = Draft::new(Material::new(to), to.searched, |r| r.search)?;
         check_names(options, from, to)?;
         for vary in &options.vary {
             let draft = pick(vary.side, &vary.name, &mut source, &mut target)?;
@@ -150,11 +156,15 @@ impl Plan {
         for fix in &options.fix {
             pick(fix.side, &fix.name, &mut source, &mut target)?.fix(&fix.name, &fix.value)?;
         }
-        if source.axes.is_empty() || target.axes.is_empty() {
-            return Err(RemapError::Option(format!(
-                "every parameter of {} is fixed; leave one to vary",
-                if source.axes.is_empty() { from.name } else { to.name }
-            )));
+        let from_material = source.fixed.clone().checked()?;
+        target.suit(&from_material)?;
+        if target.axes.is_empty() {
+            let why = if to.searched.is_empty() {
+                "has no parameters to search"
+            } else {
+                "is fixed in every parameter"
+            };
+            return Err(RemapError::Option(format!("the target model {} {why}", to.name)));
         }
         if options.size.is_some_and(|size| !SIZES.contains(&size)) {
             let (least, most) = (SIZES.start(), SIZES.end());
@@ -190,8 +200,7 @@ impl Plan {
         material(&self.from, &self.source_axes, values)
     }
 
-    /// The target material at the given values of the target axes, beside a source: parameters that are not searched
-    /// take the source's value of the same role (a diffuse colour, a conductor's index).
+    /// The target material at the given values of the target axes, beside a source: see [`carry_over`].
     pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
         let mut target = material(&self.to, &self.target_axes, values)?;
         carry_over(source, &mut target, &self.target_axes)?;
@@ -208,7 +217,8 @@ pub(crate) fn material(fixed: &Material, axes: &[Axis], values: &[f64]) -> Resul
     Ok(material)
 }
 
-/// Copies what both models have and the search leaves alone.
+/// Sets what the search leaves alone to what the source has of it: a conductor's index, the colour of the body, the hue of
+/// the specular reflection; a metal's colour and metalness where the target has one.
 pub(crate) fn carry_over(
     source: &Material,
     target: &mut Material,
@@ -216,16 +226,44 @@ pub(crate) fn carry_over(
 ) -> Result<(), RemapError> {
     let taken: Vec<usize> =
         searched.iter().map(|a| target.model().resolve(&a.name)).collect::<Result<Vec<_>, _>>()?.concat();
+    let is_free = |index: usize| !taken.contains(&index);
+    let look = source.canonical();
+    let becomes_metal = becomes_metal(source, target);
     for (index, parameter) in target.model().parameters.iter().enumerate() {
-        let shared = [Role::DiffuseReflectance, Role::ConductorIndex, Role::Extinction];
-        if !shared.contains(&parameter.role) || taken.contains(&index) {
-            continue;
-        }
-        if let Some(value) = source.by_role(parameter.role) {
-            target.set_value(index, value)?;
+        match (parameter.role, look.index) {
+            (Role::ConductorIndex, Some([eta, _])) if is_free(index) => {
+                target.set_value(index, Value::Colour(eta))?;
+            }
+            (Role::Extinction, Some([_, k])) if is_free(index) => {
+                target.set_value(index, Value::Colour(k))?
+            }
+            (Role::DiffuseReflectance, _) if is_free(index) => {
+                target.set_role(Role::DiffuseReflectance, look.body)?;
+            }
+            (Role::Metalness, _) if is_free(index) && becomes_metal => {
+                target.set_role(Role::Metalness, [look.metalness; 3])?;
+            }
+            (Role::BaseColour, _) if is_free(index) => {
+                let metal = look.f0.filter(|_| becomes_metal);
+                target.set_role(Role::BaseColour, metal.unwrap_or(look.body))?;
+            }
+            // A searched reflectance is one number: it takes the hue of the source's.
+            (Role::SpecularReflectance | Role::NormalReflectance, _) if !is_free(index) => {
+                let tint = look.tint();
+                if let Value::Colour(scale) = target.values()[index] {
+                    target.set_value(index, Value::Colour(std::array::from_fn(|c| scale[c] * tint[c])))?;
+                }
+            }
+            _ => {}
         }
     }
     Ok(())
+}
+
+/// True where a metal is to be made of a target that can be one and is not yet.
+fn becomes_metal(source: &Material, target: &Material) -> bool {
+    let is_dielectric = target.by_role(Role::Metalness).is_some_and(|m| m.mean() == Some(0.0));
+    is_dielectric && source.canonical().metalness > 0.5
 }
 
 /// Refuses two options that speak of the same parameter of the same model.
@@ -255,26 +293,35 @@ struct Draft {
     axes: Vec<Axis>,
     /// Axes whose lattice the user gave.
     given: Vec<String>,
+    /// Parameters that the user fixed.
+    held: Vec<&'static str>,
 }
 
 impl Draft {
-    fn new(
-        model: &'static Model,
-        names: &[&str],
-        levels: impl Fn(&lookmatch_materials::Range) -> Levels,
-    ) -> Result<Self, RemapError> {
-        let mut draft = Self { fixed: Material::new(model), axes: Vec::new(), given: Vec::new() };
-        for name in names {
-            if let Some(range) = model.parameter(name)?.range() {
-                draft.vary(name, levels(range))?;
-            }
-        }
+    fn new(fixed: Material, names: &[&str], levels: fn(&Range) -> Levels) -> Result<Self, RemapError> {
+        let mut draft = Self { fixed, axes: Vec::new(), given: Vec::new(), held: Vec::new() };
+        names.iter().try_for_each(|name| draft.vary_by_default(name, levels))?;
         Ok(draft)
     }
 
-    /// Puts a parameter on a lattice, in the place of an axis that shares a parameter with it.
+    /// Puts a parameter on a lattice that its description gives.
+    fn vary_by_default(&mut self, name: &str, levels: fn(&Range) -> Levels) -> Result<(), RemapError> {
+        let Some(range) = self.fixed.model().parameter(name)?.range() else { return Ok(()) };
+        let axis = match range.scale {
+            Scale::Linear => Axis::regular(name, levels(range).min, levels(range).max, levels(range).step)?,
+            Scale::Logarithmic => geometric(name, levels(range))?,
+        };
+        self.insert(axis)
+    }
+
+    /// Puts a parameter on a regular lattice.
     fn vary(&mut self, name: &str, levels: Levels) -> Result<(), RemapError> {
-        let axis = Axis::regular(name, levels.min, levels.max, levels.step)?;
+        self.insert(Axis::regular(name, levels.min, levels.max, levels.step)?)
+    }
+
+    /// Adds an axis, in the place of one that shares a parameter with it.
+    fn insert(&mut self, axis: Axis) -> Result<(), RemapError> {
+        let name = &axis.name.clone();
         for value in [axis.value(0), axis.value(axis.len() - 1)] {
             self.fixed.clone().set_number(name, value)?;
         }
@@ -286,6 +333,8 @@ impl Draft {
     fn fix(&mut self, name: &str, value: &str) -> Result<(), RemapError> {
         self.fixed.set(name, value)?;
         self.release(name)?;
+        let model = self.fixed.model();
+        self.held.extend(model.resolve(name)?.into_iter().map(|i| model.parameters[i].name));
         Ok(())
     }
 
@@ -301,6 +350,28 @@ impl Draft {
         Ok(place)
     }
 
+    /// Searches what matters beside a source: of a target that becomes a metal, nothing of the dielectric; of a target that
+    /// is a conductor, its scale, unless its index can be the source's.
+    fn suit(&mut self, source: &Material) -> Result<(), RemapError> {
+        let model = self.fixed.model();
+        if becomes_metal(source, &self.fixed) {
+            let given = &self.given;
+            let role = |axis: &Axis| model.parameter(&axis.name).map(|p| p.role);
+            self.axes
+                .retain(|axis| given.contains(&axis.name) || !role(axis).is_ok_and(Role::is_reflectance));
+        }
+        let is_conductor = self.fixed.by_role(Role::ConductorIndex).is_some() && model.has_fresnel;
+        let scale = model.parameters.iter().find(|p| p.role == Role::SpecularReflectance);
+        if let Some(scale) = scale.filter(|_| is_conductor && source.canonical().index.is_none()) {
+            let is_set = self.axes.iter().any(|a| a.name == scale.name) || self.held.contains(&scale.name);
+            if !is_set {
+                let axis = Axis::regular(scale.name, 0.0, 1.0, SCALE_STEP)?;
+                self.axes.insert(0, axis);
+            }
+        }
+        Ok(())
+    }
+
     /// Searches the parameters behind an alias (`roughness_u` and `roughness_v` behind `roughness`) one by one where the
     /// source does not tie them: an anisotropic source has an anisotropic target.
     fn follow(&mut self, source: &Draft) -> Result<(), RemapError> {
@@ -312,9 +383,7 @@ impl Draft {
                 continue;
             }
             for name in alias.parameters {
-                if let Some(range) = model.parameter(name)?.range() {
-                    self.vary(name, range.search)?;
-                }
+                self.vary_by_default(name, |range| range.search)?;
             }
         }
         Ok(())
@@ -346,10 +415,8 @@ impl Draft {
             let Some(range) = parameter.range().filter(|_| !self.given.contains(&axis.name)) else {
                 continue;
             };
-            let Levels { min, max, step } = range.search;
-            if needed > max {
-                let steps = ((needed - min) / step - 1e-9).ceil();
-                *axis = Axis::regular(&axis.name, min, (min + steps * step).min(range.valid.max), step)?;
+            if needed > range.search.max {
+                *axis = widened(&axis.name, range, needed)?;
             }
         }
         Ok(())
@@ -377,31 +444,41 @@ fn pick<'a>(
     }
 }
 
-/// The highest reflectance at normal incidence that a side can have, for models with one.
+/// The highest reflectance at normal incidence that a side can have, in any channel; `None` where its parameters do not
+/// tell.
 fn highest_f0(draft: &Draft) -> Result<Option<f64>, RemapError> {
-    let model = draft.fixed.model();
-    let highest = |role: Role| -> Result<Option<f64>, RemapError> {
-        for (index, parameter) in model.parameters.iter().enumerate() {
-            if parameter.role == role {
-                let axis =
-                    draft.axes.iter().find(|a| model.resolve(&a.name).is_ok_and(|i| i.contains(&index)));
-                return Ok(Some(match axis {
-                    Some(axis) => axis.value(axis.len() - 1),
-                    None => draft.fixed.number(parameter.name)?,
-                }));
-            }
-        }
-        Ok(None)
-    };
-    if highest(Role::ConductorIndex)?.is_some() {
-        return Ok(None);
+    let mut brightest = draft.fixed.clone();
+    for axis in &draft.axes {
+        brightest.set_number(&axis.name, axis.value(axis.len() - 1))?;
     }
-    let scale = highest(Role::SpecularReflectance)?;
-    Ok(match (scale, highest(Role::RefractiveIndex)?) {
-        (Some(scale), Some(ior)) => Some(scale * f0_from_ior(ior)),
-        (scale, None) => scale,
-        (None, Some(ior)) => Some(f0_from_ior(ior)),
-    })
+    let f0 = brightest.canonical().f0;
+    Ok(f0.map(|f0| f0.into_iter().fold(0.0, f64::max)))
+}
+
+/// The levels of a range, carried on to at least `needed`: in equal steps at first, then in equal ratios.
+fn widened(name: &str, range: &Range, needed: f64) -> Result<Axis, RemapError> {
+    let Levels { min, step, .. } = range.search;
+    let steps = |to: f64| ((to - min) / step - 1e-9).ceil();
+    let regular = needed.min(EQUAL_STEPS).min(range.valid.max);
+    let mut levels = Axis::regular(name, min, min + steps(regular) * step, step)?.levels;
+    levels.retain(|level| *level <= range.valid.max);
+    while levels.last().is_some_and(|last| *last < needed.min(range.valid.max)) {
+        let next = levels[levels.len() - 1] * (1.0 + step);
+        levels.push(((next * 1e3).round() / 1e3).min(range.valid.max));
+    }
+    Ok(Axis::listed(name, levels)?)
+}
+
+/// Levels of equal ratios.
+fn geometric(name: &str, Levels { min, max, step }: Levels) -> Result<Axis, RemapError> {
+    let count = ((max / min).ln() / step.ln() + 1e-9).floor() as i32;
+    let round = |v: f64| {
+        // Four digits tell levels apart and are short to read.
+        let digit = 10f64.powi(v.abs().log10().floor() as i32 - 3);
+        (v / digit).round() * digit
+    };
+    let rounded = |v: f64| (round(v) * 1e9).round() / 1e9;
+    Ok(Axis::listed(name, (0..=count).map(|k| rounded(min * step.powi(k))).collect())?)
 }
 
 /// At most [`QUICK_LEVELS`] levels of an axis, both ends among them.

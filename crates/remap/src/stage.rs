@@ -1,25 +1,31 @@
 //! The reference scene under its two lights, materials as seen in it, and the distance between two of them.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use lookmatch_imaging::{
-    Fitness, Reduce, Space, lab_planes, lab_planes_of, squared_distance, weighted_squared_distance,
+use lookmatch_imaging::{Fitness, Reduce, Space, lab_planes_of, squared_distance, weighted_squared_distance};
+use lookmatch_materials::Material;
+use lookmatch_rendering::{
+    DiffuseKey, Illumination, Observe, Part, Planes, Progress, Renderer, SplitLobes, TransportCache,
 };
-use lookmatch_materials::{Bsdf, Material};
-use lookmatch_rendering::{Illumination, Lobes, Observe, Part, Planes, Progress, Renderer, TransportCache};
 use rayon::prelude::*;
 
 use crate::projection::{Projection, Sketches};
 use crate::{Plan, RemapError};
 
-/// What the metric knows of a material: the specular images under both lights in CIELAB, on the subject's pixels only.
-/// Everywhere else two materials look the same, because nothing else in the scene changes.
+/// What the metric knows of a material: its specular and diffuse images under both lights in CIELAB, on the subject's
+/// pixels only. Everywhere else two materials look the same, because nothing else in the scene changes.
 #[derive(Clone, Debug)]
 pub struct Appearance {
-    /// Planes L*, a*, b* of the specular image under the point light.
+    specular: Images,
+    /// Shared by all materials with the same diffuse reflection.
+    diffuse: Arc<Images>,
+}
+
+/// Images under both lights: planes L*, a*, b*.
+#[derive(Clone, Debug)]
+struct Images {
     point: Vec<f32>,
-    /// The same under the environment.
     environment: Vec<f32>,
 }
 
@@ -30,8 +36,8 @@ pub struct Stage {
     metric: Fitness,
     /// Mask weights on the subject's pixels.
     weights: Option<Vec<f32>>,
-    /// Diffuse-only images in CIELAB by albedo: few, because the albedo is seldom searched.
-    diffuse: Mutex<HashMap<[u64; 3], Arc<Appearance>>>,
+    /// The diffuse images of appearances that still exist.
+    diffuse: Mutex<HashMap<DiffuseKey, Weak<Images>>>,
 }
 
 impl Stage {
@@ -67,26 +73,27 @@ impl Stage {
         Ok(Self { metric: plan.metric, weights, diffuse, point, environment })
     }
 
-    /// Size of an [`Appearance`]: three planes under each of two lights.
+    /// Size of an [`Appearance`] with diffuse images of its own: three planes of two images under each of two lights.
     pub(crate) fn appearance_bytes(&self) -> usize {
-        2 * 3 * self.point.subjects().len() * size_of::<f32>()
+        2 * 2 * 3 * self.point.subjects().len() * size_of::<f32>()
     }
 
     /// Renders materials, on all cores, in their order.
     pub fn appearances(&self, materials: &[Material]) -> Vec<Appearance> {
-        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
-        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
-        let lobes = Lobes::new(&bsdfs);
-        let lab = |renderer: &Renderer| -> Vec<Vec<f32>> {
-            let lab = |[r, g, b]: &Planes| {
-                let mut lab = vec![0.0; 3 * r.len()];
-                lab_planes_of([r, g, b], &mut lab);
-                lab
-            };
-            renderer.specular_planes(&lobes).par_iter().map(lab).collect()
+        let lobes = SplitLobes::new(materials);
+        let (point, environment) = (self.point.split_planes(&lobes), self.environment.split_planes(&lobes));
+        let images = |point: &Planes, environment: &Planes| Images {
+            point: lab(point),
+            environment: lab(environment),
         };
-        let pairs = lab(&self.point).into_iter().zip(lab(&self.environment));
-        pairs.map(|(point, environment)| Appearance { point, environment }).collect()
+        let appearance = |k: usize| Appearance {
+            specular: images(&point.specular[k], &environment.specular[k]),
+            diffuse: self.diffuse_images(lobes.diffuse_key(k), &|| {
+                let place = lobes.diffuse_place(k);
+                images(&point.diffuse[place], &environment.diffuse[place])
+            }),
+        };
+        (0..materials.len()).into_par_iter().map(appearance).collect()
     }
 
     /// Renders one material.
@@ -94,28 +101,22 @@ impl Stage {
         self.appearances(std::slice::from_ref(material)).swap_remove(0)
     }
 
-    /// Eq. 3 of Guarnera *et al.* (2018) between two materials whose specular appearances are given.
-    pub fn fitness(
-        &self,
-        (a, seen_a): (&Material, &Appearance),
-        (b, seen_b): (&Material, &Appearance),
-    ) -> f64 {
+    /// Eq. 3 of Guarnera *et al.* (2018) between two materials as they are seen.
+    pub fn fitness(&self, a: &Appearance, b: &Appearance) -> f64 {
         let w = &self.metric.weights;
         let specular = w.specular
-            * (w.specular_point * self.rms(&seen_a.point, &seen_b.point)
-                + w.specular_environment * self.rms(&seen_a.environment, &seen_b.environment));
-        let (albedo_a, albedo_b) = (a.bsdf().diffuse(), b.bsdf().diffuse());
-        if albedo_a == albedo_b { specular } else { specular + self.diffuse_fitness(a, b) }
+            * (w.specular_point * self.rms(&a.specular.point, &b.specular.point)
+                + w.specular_environment * self.rms(&a.specular.environment, &b.specular.environment));
+        specular + self.diffuse_fitness(a, b)
     }
 
     /// The part of Eq. 3 that the diffuse images make.
-    pub(crate) fn diffuse_fitness(&self, a: &Material, b: &Material) -> f64 {
-        let (albedo_a, albedo_b) = (a.bsdf().diffuse(), b.bsdf().diffuse());
-        if albedo_a == albedo_b {
+    pub(crate) fn diffuse_fitness(&self, a: &Appearance, b: &Appearance) -> f64 {
+        let (a, b) = (&a.diffuse, &b.diffuse);
+        if Arc::ptr_eq(a, b) {
             return 0.0;
         }
         let w = &self.metric.weights;
-        let (a, b) = (self.diffuse_appearance(a, albedo_a), self.diffuse_appearance(b, albedo_b));
         let diffuse = w.diffuse_point * self.rms(&a.point, &b.point)
             + w.diffuse_environment * self.rms(&a.environment, &b.environment);
         w.diffuse * diffuse
@@ -135,26 +136,26 @@ impl Stage {
             let samples: Vec<&[f32]> = samples.iter().map(planes).collect();
             Projection::fit(&samples, self.weights.as_deref(), tolerance)
         };
-        [fit(|s| &s.point, point), fit(|s| &s.environment, environment)]
+        [fit(|s| &s.specular.point, point), fit(|s| &s.specular.environment, environment)]
     }
 
-    /// Renders materials and keeps no more of them than their coordinates.
+    /// Renders materials and keeps no more of them than the coordinates of their specular images, and what tells their
+    /// diffuse ones apart.
     pub(crate) fn sketches(
         &self,
         materials: &[Material],
         [point, environment]: &[Projection; 2],
-    ) -> [Sketches; 2] {
-        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
-        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
-        let lobes = Lobes::new(&bsdfs);
+    ) -> ([Sketches; 2], Vec<DiffuseKey>) {
+        let lobes = SplitLobes::new(materials);
         let sketch = |renderer: &Renderer, projection: &Projection| {
-            let images = renderer.specular_planes(&lobes);
+            let images = renderer.split_planes(&lobes).specular;
             projection.project(images.len(), &|image, pixels, planes| {
                 let [r, g, b] = &images[image];
                 lab_planes_of([&r[pixels.clone()], &g[pixels.clone()], &b[pixels]], planes);
             })
         };
-        [sketch(&self.point, point), sketch(&self.environment, environment)]
+        let keys = (0..materials.len()).map(|k| lobes.diffuse_key(k)).collect();
+        ([sketch(&self.point, point), sketch(&self.environment, environment)], keys)
     }
 
     /// The coordinates of appearances.
@@ -170,7 +171,7 @@ impl Stage {
                 parts.for_each(|(part, whole)| part.copy_from_slice(&whole[pixels.clone()]));
             })
         };
-        [sketch(|s| &s.point, point), sketch(|s| &s.environment, environment)]
+        [sketch(|s| &s.specular.point, point), sketch(|s| &s.specular.environment, environment)]
     }
 
     /// NRMSD per channel of the full pictures under the environment, whole image: without and with the mask.
@@ -180,17 +181,22 @@ impl Stage {
         Ok([nrmsd(None)?, nrmsd(Some(self.environment.mask()))?])
     }
 
-    fn diffuse_appearance(&self, material: &Material, albedo: [f64; 3]) -> Arc<Appearance> {
-        let key = albedo.map(f64::to_bits);
+    /// Diffuse images that are known, or new ones.
+    fn diffuse_images(&self, key: DiffuseKey, render: &dyn Fn() -> Images) -> Arc<Images> {
         // A panic elsewhere leaves nothing half-written in this map.
-        let mut cache = self.diffuse.lock().unwrap_or_else(PoisonError::into_inner);
-        let lab = |renderer: &Renderer| {
-            let image = renderer.render(material, Part::DiffuseOnly);
-            let pixels: Vec<_> = renderer.subjects().iter().map(|i| image.pixels()[*i as usize]).collect();
-            planes(&pixels)
-        };
-        let render = || Appearance { point: lab(&self.point), environment: lab(&self.environment) };
-        cache.entry(key).or_insert_with(|| Arc::new(render())).clone()
+        let known = || self.diffuse.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(images) = known().get(&key).and_then(Weak::upgrade) {
+            return images;
+        }
+        let images = Arc::new(render());
+        let mut known = known();
+        known.retain(|_, images| images.strong_count() > 0);
+        // Another thread may have been faster: all must share one.
+        if let Some(images) = known.get(&key).and_then(Weak::upgrade) {
+            return images;
+        }
+        known.insert(key, Arc::downgrade(&images));
+        images
     }
 
     /// Root mean square of ΔE76 over the whole image; pixels beside the subject add nothing.
@@ -203,10 +209,10 @@ impl Stage {
     }
 }
 
-fn planes(pixels: &[[f32; 3]]) -> Vec<f32> {
-    let mut planes = vec![0.0; 3 * pixels.len()];
-    lab_planes(pixels, &mut planes);
-    planes
+fn lab([r, g, b]: &Planes) -> Vec<f32> {
+    let mut lab = vec![0.0; 3 * r.len()];
+    lab_planes_of([r, g, b], &mut lab);
+    lab
 }
 
 #[cfg(test)]
@@ -242,7 +248,7 @@ mod tests {
             };
             let a = Material::parse("ward:diffuse=0.4,specular=0.2,roughness=0.1").unwrap();
             let b = Material::parse("ggx:diffuse=0.5/0.4/0.3,ior=1.8,roughness=0.15").unwrap();
-            let fast = stage.fitness((&a, &stage.appearance(&a)), (&b, &stage.appearance(&b)));
+            let fast = stage.fitness(&stage.appearance(&a), &stage.appearance(&b));
             let mask = mask.then(|| stage.point.mask());
             let exact = plan.metric.evaluate(&images(&a), &images(&b), mask).unwrap();
             assert!((fast - exact).abs() < 1e-3 * exact, "{fast} {exact}");

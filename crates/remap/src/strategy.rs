@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use lookmatch_materials::Role;
+use lookmatch_materials::{Role, Trend};
 use lookmatch_search::{
     Bounds, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError, by_name,
 };
@@ -241,10 +241,10 @@ fn place_of(sources: &Lattice, indices: &[u32]) -> usize {
     indices.iter().zip(&sources.axes).fold(0, |sum, (i, axis)| sum * axis.len() + *i as usize)
 }
 
-/// Which target axes grow with which source axes, by the roles of their parameters.
+/// Which target axes follow which source axes, by the roles of their parameters.
 struct Pairing {
-    /// For each source axis, the target axes that correspond to it.
-    targets: Vec<Vec<usize>>,
+    /// For each source axis, the target axes that follow it, and how.
+    targets: Vec<Vec<(usize, Trend)>>,
     /// For each source axis, target axes that switch the lobe on or off.
     switches: Vec<Vec<usize>>,
     /// Levels of the source's axes.
@@ -261,12 +261,17 @@ impl Pairing {
         let (from, to) = (roles(&plan.from, &plan.source_axes)?, roles(&plan.to, &plan.target_axes)?);
         let is_switch =
             |k: usize| to[k] == Role::SpecularReflectance && plan.target_axes[k].levels == [0.0, 1.0];
-        let axes = |role: Role, wanted: &dyn Fn(usize) -> bool| -> Vec<usize> {
-            (0..to.len()).filter(|k| role.corresponds_to(to[*k]) && wanted(*k)).collect()
+        let followers = |role: &Role| -> Vec<(usize, Trend)> {
+            (0..to.len()).filter_map(|k| Some((k, role.trend(to[k])?))).collect()
         };
+        let split = |switch: bool| -> Vec<Vec<(usize, Trend)>> {
+            let of = |role| followers(role).into_iter().filter(|(k, _)| is_switch(*k) == switch).collect();
+            from.iter().map(of).collect()
+        };
+        let places = |axes: Vec<(usize, Trend)>| axes.into_iter().map(|(k, _)| k).collect();
         Ok(Self {
-            targets: from.iter().map(|role| axes(*role, &|k| !is_switch(k))).collect(),
-            switches: from.iter().map(|role| axes(*role, &is_switch)).collect(),
+            targets: split(false),
+            switches: split(true).into_iter().map(places).collect(),
             levels: plan.source_axes.iter().map(|a| a.levels.clone()).collect(),
         })
     }
@@ -276,8 +281,8 @@ impl Pairing {
         Problem { lattice, bounds: Bounds::full(lattice), guesses: Vec::new(), seed }
     }
 
-    /// A source point led by its neighbours with one smaller source parameter: corresponding target parameters may not
-    /// be smaller than theirs, and the search starts where they ended (Guarnera *et al.* 2018, 3.4).
+    /// A source point led by its neighbours with one smaller source parameter: target parameters that rise with it may not
+    /// be smaller than theirs, those that fall not larger, and the search starts where they ended (Guarnera *et al.* 2018, 3.4).
     fn led<'a, 'f>(
         &self,
         lattice: &'a Lattice,
@@ -298,8 +303,12 @@ impl Pairing {
             }
             smaller[axis] -= 1;
             if let Some(neighbour) = result(&smaller) {
-                for k in &self.targets[axis] {
-                    problem.bounds.low[*k] = problem.bounds.low[*k].max(neighbour[*k]);
+                for (k, trend) in &self.targets[axis] {
+                    let Bounds { low, high } = &mut problem.bounds;
+                    match trend {
+                        Trend::Rising => low[*k] = low[*k].max(neighbour[*k]),
+                        Trend::Falling => high[*k] = high[*k].min(neighbour[*k]),
+                    }
                 }
                 neighbours.push((axis, neighbour));
             }

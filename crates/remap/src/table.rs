@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use lookmatch_imaging::Columns;
-use lookmatch_materials::{Material, Role};
+use lookmatch_materials::Material;
 use lookmatch_search::{Bounds, Lattice, Outcome, Point, SearchError};
 use rayon::prelude::*;
 
@@ -28,7 +28,6 @@ const TOLERANCE: f64 = 0.002;
 
 /// All targets of a plan, to be compared with sources.
 pub(crate) struct FitnessTable<'a> {
-    plan: &'a Plan,
     stage: &'a Stage,
     lattice: &'a Lattice,
     /// A material of each look that a target can have.
@@ -40,6 +39,8 @@ pub(crate) struct FitnessTable<'a> {
     coordinates: [Columns; 2],
     /// Fitness by which rounding may have moved each look.
     slack: Vec<f64>,
+    /// One of the looks, where all have the same diffuse images.
+    diffuse: Option<Appearance>,
 }
 
 /// A source material and where to search its match.
@@ -56,8 +57,7 @@ pub(crate) struct Found {
 }
 
 /// A source on its way to its match.
-struct Pursuit<'t> {
-    task: &'t Task,
+struct Pursuit {
     seen: Appearance,
     /// Lower bounds of the fitness, by look.
     least: Vec<f64>,
@@ -71,8 +71,7 @@ struct Pursuit<'t> {
 type Pair = (u32, usize, usize);
 
 impl<'a> FitnessTable<'a> {
-    /// Renders all targets; `None` where targets depend on their source beyond the diffuse reflectance, so that they
-    /// cannot be shared.
+    /// Renders all targets; `None` where targets depend on their source, so that they cannot be shared.
     pub(crate) fn fill(
         plan: &'a Plan,
         stage: &'a Stage,
@@ -81,18 +80,21 @@ impl<'a> FitnessTable<'a> {
         observe: &mut dyn FnMut(Event),
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Self>, RemapError> {
-        if !targets_are_shared(plan)? {
+        if !targets_are_shared(plan, lattice, sources)? {
             return Ok(None);
         }
         let any = plan.source_material(&sources.values(&vec![0; sources.axes.len()]))?;
         let (looks, look_of) = looks(plan, lattice, &any)?;
         let projections = projections(plan, stage, sources, &looks)?;
         let mut sketches = [Sketches::default(), Sketches::default()];
+        let (mut first_key, mut is_diffuse_shared) = (None, true);
         for (k, batch) in looks.chunks(BATCH).enumerate() {
             if stop() {
                 return Err(stopped());
             }
-            let new = stage.sketches(batch, &projections);
+            let (new, keys) = stage.sketches(batch, &projections);
+            first_key = first_key.or(keys.first().copied());
+            is_diffuse_shared &= keys.iter().all(|key| Some(*key) == first_key);
             sketches.iter_mut().zip(new).for_each(|(sketches, new)| sketches.extend(new));
             observe(Event::Compared { done: k * BATCH + batch.len(), total: looks.len() });
         }
@@ -102,7 +104,8 @@ impl<'a> FitnessTable<'a> {
             Columns::new(length, &sketches[light].rows(length))
         };
         let coordinates = [columns(0), columns(1)];
-        Ok(Some(Self { plan, stage, lattice, looks, look_of, projections, coordinates, slack }))
+        let diffuse = looks.first().filter(|_| is_diffuse_shared).map(|look| stage.appearance(look));
+        Ok(Some(Self { stage, lattice, looks, look_of, projections, coordinates, slack, diffuse }))
     }
 
     /// The best target of each source within its bounds, at a tie the first in lexicographic order.
@@ -111,7 +114,7 @@ impl<'a> FitnessTable<'a> {
         tasks: &[Task],
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Found>, RemapError> {
-        let mut pursuits = self.pursuits(tasks)?;
+        let mut pursuits = self.pursuits(tasks);
         // At first the most promising target of each source; then there is a fitness to beat.
         for _ in 0..2 {
             let wanted = |(k, pursuit): (usize, &Pursuit)| -> Vec<Pair> {
@@ -124,25 +127,24 @@ impl<'a> FitnessTable<'a> {
                 if stop() {
                     return Err(stopped());
                 }
-                self.compare(batch, &mut pursuits)?;
+                self.compare(batch, &mut pursuits);
             }
         }
         pursuits.iter().map(|pursuit| self.found(pursuit)).collect()
     }
 
     /// Renders the sources, and bounds their fitness to every target from below.
-    fn pursuits<'t>(&self, tasks: &'t [Task]) -> Result<Vec<Pursuit<'t>>, RemapError> {
+    fn pursuits(&self, tasks: &[Task]) -> Vec<Pursuit> {
         let sources: Vec<Material> = tasks.iter().map(|task| task.source.clone()).collect();
         let seen = self.stage.appearances(&sources);
         let sketches = self.stage.sketches_of(&seen, &self.projections);
         let least = self.least_fitness(&sketches);
-        let pursuit = |((task, seen), mut least): ((&'t Task, Appearance), Vec<f64>)| {
-            // Targets of one source share their diffuse reflectance.
-            let target = self.plan.target_material(&task.source, &self.lattice.values(&task.bounds.low))?;
-            let diffuse = self.stage.diffuse_fitness(&task.source, &target);
+        let pursuit = |((task, seen), mut least): ((&Task, Appearance), Vec<f64>)| {
+            let diffuse =
+                self.diffuse.as_ref().map_or(0.0, |target| self.stage.diffuse_fitness(&seen, target));
             least.iter_mut().for_each(|least| *least += diffuse);
             let places = places(self.lattice, &task.bounds);
-            Ok(Pursuit { task, seen, least, places, compared: HashMap::new() })
+            Pursuit { seen, least, places, compared: HashMap::new() }
         };
         tasks.iter().zip(seen).zip(least).map(pursuit).collect()
     }
@@ -165,24 +167,20 @@ impl<'a> FitnessTable<'a> {
     }
 
     /// Compares the looks of a batch in full, each with all sources that ask for it.
-    fn compare(&self, batch: &[&[Pair]], pursuits: &mut [Pursuit]) -> Result<(), RemapError> {
+    fn compare(&self, batch: &[&[Pair]], pursuits: &mut [Pursuit]) {
         let looks: Vec<Material> =
             batch.iter().map(|pairs| self.looks[pairs[0].0 as usize].clone()).collect();
         let seen = self.stage.appearances(&looks);
         let with_look =
             |(pairs, seen): (&&'_ [Pair], _)| pairs.iter().map(move |pair| (*pair, seen)).collect::<Vec<_>>();
         let pairs: Vec<(Pair, &Appearance)> = batch.iter().zip(&seen).flat_map(with_look).collect();
-        let fitness = |((_, pursuit, place), seen): &(Pair, &Appearance)| {
-            let Pursuit { task, seen: source_seen, .. } = &pursuits[*pursuit];
-            let values = self.lattice.values(&point(self.lattice, *place));
-            let target = self.plan.target_material(&task.source, &values)?;
-            Ok(self.stage.fitness((&task.source, source_seen), (&target, *seen)))
+        let fitness = |((_, pursuit, _), seen): &(Pair, &Appearance)| {
+            self.stage.fitness(&pursuits[*pursuit].seen, seen)
         };
-        let fitness = pairs.par_iter().map(fitness).collect::<Result<Vec<f64>, RemapError>>()?;
+        let fitness: Vec<f64> = pairs.par_iter().map(fitness).collect();
         for (((look, pursuit, place), _), fitness) in pairs.into_iter().zip(fitness) {
             pursuits[pursuit].compared.insert(look, (fitness, place));
         }
-        Ok(())
     }
 
     fn found(&self, pursuit: &Pursuit) -> Result<Found, RemapError> {
@@ -199,7 +197,7 @@ impl<'a> FitnessTable<'a> {
     }
 }
 
-impl Pursuit<'_> {
+impl Pursuit {
     /// The lowest fitness found and its first place; what is no number comes first, to be reported.
     fn best(&self) -> Option<(f64, usize)> {
         let order = |f: f64| if f.is_nan() { f64::NEG_INFINITY } else { f };
@@ -298,15 +296,18 @@ fn stopped() -> RemapError {
     RemapError::Search(SearchError::Objective(Box::new(Stopped)))
 }
 
-/// True where no source axis changes what a target takes over.
-fn targets_are_shared(plan: &Plan) -> Result<bool, RemapError> {
-    for axis in &plan.source_axes {
-        let role = plan.from.model().parameter(&axis.name)?.role;
-        if matches!(role, Role::ConductorIndex | Role::Extinction | Role::DiffuseReflectance) {
+/// True where no source changes what its targets take over.
+fn targets_are_shared(plan: &Plan, lattice: &Lattice, sources: &Lattice) -> Result<bool, RemapError> {
+    let first = lattice.values(&vec![0; lattice.axes.len()]);
+    let target = |point: Point| -> Result<Material, RemapError> {
+        plan.target_material(&plan.source_material(&sources.values(&point))?, &first)
+    };
+    let mut targets = sources.points(&Bounds::full(sources)).map(target);
+    let Some(one) = targets.next().transpose()? else { return Ok(true) };
+    for other in targets {
+        if other? != one {
             return Ok(false);
         }
     }
-    // A searched diffuse reflectance differs between targets without a lobe.
-    let searched = plan.target_axes.iter().map(|a| plan.to.model().parameter(&a.name).map(|p| p.role));
-    Ok(!searched.collect::<Result<Vec<_>, _>>()?.contains(&Role::DiffuseReflectance))
+    Ok(true)
 }

@@ -4,8 +4,8 @@
 
 use std::time::Instant;
 
-use lookmatch_materials::{Bsdf, Material};
-use lookmatch_rendering::{Illumination, Renderer, Scene};
+use lookmatch_materials::Material;
+use lookmatch_rendering::{Illumination, Lobes, Renderer, Scene};
 
 const BATCH: usize = 64;
 
@@ -23,11 +23,10 @@ fn main() {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("one thread");
     let material = |k: usize| {
         let roughness = 0.05 + 0.01 * k as f64;
-        Material::parse(&format!("ggx:ior=1.5,roughness={roughness}")).expect("a material").bsdf()
+        Material::parse(&format!("ggx:ior=1.5,roughness={roughness}")).expect("a material")
     };
-    let lobes: Vec<Box<dyn Bsdf>> = (0..BATCH).map(material).collect();
-    let lobes: Vec<&dyn Bsdf> = lobes.iter().map(|b| &**b).collect();
-    let brushed = Material::parse("ggx:roughness_u=0.05,roughness_v=0.3").expect("a material").bsdf();
+    let materials: Vec<Material> = (0..BATCH).map(material).collect();
+    let brushed = [Material::parse("ggx:roughness_u=0.05,roughness_v=0.3").expect("a material")];
     println!(
         "{:<24}{:>12}{:>12}{:>14}{:>18}{:>12}",
         "300 x 300 px", "prepare s", "single ms", "batch of 64 ms", "anisotropic ms", "floor ms"
@@ -41,9 +40,13 @@ fn main() {
         let start = Instant::now();
         let renderer = Renderer::prepare(&scene, light, 300).expect("a built-in scene").keep_transport();
         let prepare = start.elapsed().as_secs_f64();
-        let single = fastest(5, || drop(renderer.specular_pixels(lobes[0])));
-        let batch = fastest(3, || drop(renderer.specular_batch(&lobes))) / BATCH as f64;
-        let anisotropic = fastest(1, || drop(renderer.specular_pixels(&*brushed)));
+        let render = |materials: &[Material]| {
+            let lobes = Lobes::new(materials.iter().map(Material::bsdf).collect());
+            drop(renderer.subject_planes(&lobes));
+        };
+        let single = fastest(5, || render(&materials[..1]));
+        let batch = fastest(3, || render(&materials)) / BATCH as f64;
+        let anisotropic = fastest(1, || render(&brushed));
         let rows = vec![1.0f32; renderer.subjects().len() * 216];
         let floor = fastest(5, || drop(std::hint::black_box(rows.clone())));
         println!(

@@ -34,7 +34,7 @@ pub(crate) fn radiance(field: &Field, film: &Film, pixel: usize, bsdf: &dyn Bsdf
         let [a, b] = zero_two(i);
         let wi = sampling.sample(*wo, [(a + shift[0]).fract(), (b + shift[1]).fract()]);
         let Some(g) = Geometry::new(wi, *wo) else { continue };
-        let density = sampling.density(&g);
+        let density = sampling.density(g.wi, g.wo);
         if density <= 0.0 {
             continue;
         }

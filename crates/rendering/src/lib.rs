@@ -50,10 +50,10 @@ pub use cache::{Observe, Progress, TransportCache};
 pub use designed_map::designed_map;
 pub use environment::EnvironmentMap;
 pub use error::SceneError;
-pub use lobes::Lobes;
+pub use lobes::{DiffuseKey, Lobes, SplitLobes};
 pub use path_tracer::PathTracer;
 pub use render::{RENDERERS, Render, RendererEntry};
-pub use renderer::{Part, Renderer};
+pub use renderer::{Part, Renderer, SplitPlanes};
 pub use scene::{Camera, EnvironmentLight, Illumination, Mesh, Plane, PointLight, Scene, Sphere};
 pub use transport::Planes;
 

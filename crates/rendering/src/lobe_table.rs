@@ -72,6 +72,11 @@ impl LobeTable {
         self.angles.iter().step_by(4)
     }
 
+    /// All coefficients, for hashing.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(self.angles.as_flattened().as_flattened())
+    }
+
     /// Sets the coefficients at an angle of view, in radians.
     pub(crate) fn at(&self, theta: f64, out: &mut Coefficients) {
         let x = Self::place(theta);

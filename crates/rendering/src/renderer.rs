@@ -17,7 +17,7 @@ use crate::flat::{Flat, Reader, Writer};
 use crate::gather;
 use crate::highlights::Highlights;
 use crate::irradiance::Place;
-use crate::lobes::{Expanded, Lobes};
+use crate::lobes::{Expanded, Lobes, SplitLobes};
 use crate::returned::{Returned, ReturnedLight};
 use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
@@ -33,8 +33,16 @@ mod accuracy;
 pub enum Part {
     /// Diffuse and specular.
     Full,
-    /// Diffuse only, every specular reflectance set to 0.
+    /// The diffuse reflection alone: see [`Material::diffuse_only`].
     DiffuseOnly,
+}
+
+/// What subject pixels show of some materials, as planes of linear red, green and blue.
+pub struct SplitPlanes {
+    /// For each material, what its picture has beyond the diffuse one.
+    pub specular: Vec<Planes>,
+    /// Pictures of the diffuse reflections that differ: see [`SplitLobes::diffuse_place`].
+    pub diffuse: Vec<Planes>,
 }
 
 /// The light of the scene. Where the transport was read, it is baked when it is first needed: only lobes that are not
@@ -169,15 +177,14 @@ impl Renderer {
 
     /// Pictures of several materials, in their order: the prepared light is read once for all.
     pub fn render_batch(&self, materials: &[&Material], part: Part) -> Vec<Image> {
-        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(|m| m.bsdf()).collect();
-        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
-        let lobes = match part {
-            Part::Full => Lobes::new(&bsdfs),
-            Part::DiffuseOnly => Lobes::without_lobes(&bsdfs),
+        let bsdf = |m: &&Material| match part {
+            Part::Full => m.bsdf(),
+            Part::DiffuseOnly => m.diffuse_only().bsdf(),
         };
+        let lobes = Lobes::new(materials.iter().map(bsdf).collect());
         let planes = self.subject_planes(&lobes);
         let materials = lobes.bsdfs.iter().zip(&lobes.expanded);
-        let weights = materials.map(|(bsdf, expanded)| self.weights(*bsdf, expanded.as_ref()));
+        let weights = materials.map(|(bsdf, expanded)| self.weights(&**bsdf, expanded.as_ref()));
         planes.iter().zip(weights).map(|(planes, weights)| self.developed(planes, &weights)).collect()
     }
 
@@ -219,38 +226,34 @@ impl Renderer {
         &self.mask
     }
 
-    /// What the specular lobe adds to each subject pixel, linear RGB.
-    pub fn specular_pixels(&self, bsdf: &dyn Bsdf) -> Vec<[f32; 3]> {
-        self.specular_batch(&[bsdf]).swap_remove(0)
+    /// What each subject pixel shows of some materials, split into diffuse and specular reflection: the prepared light is
+    /// read once for all.
+    pub fn split_planes(&self, lobes: &SplitLobes) -> SplitPlanes {
+        let diffuse = self.subject_planes(&lobes.diffuse);
+        let mut specular = self.planes(&lobes.whole, &|material| !lobes.is_plain[material]);
+        specular.par_iter_mut().enumerate().filter(|(k, _)| !lobes.is_plain[*k]).for_each(|(k, planes)| {
+            for (plane, diffuse) in planes.iter_mut().zip(&diffuse[lobes.diffuse_of[k]]) {
+                plane.iter_mut().zip(diffuse).for_each(|(whole, diffuse)| *whole -= diffuse);
+            }
+        });
+        SplitPlanes { specular, diffuse }
     }
 
-    /// [`Renderer::specular_pixels`] of several materials at once, in their order.
-    pub fn specular_batch(&self, bsdfs: &[&dyn Bsdf]) -> Vec<Vec<[f32; 3]>> {
-        let interleaved =
-            |[r, g, b]: Planes| r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
-        self.specular_planes(&Lobes::new(bsdfs)).into_par_iter().map(interleaved).collect()
-    }
-
-    /// What some lobes add to each subject pixel, for each material as planes of linear red, green and blue: the prepared
-    /// light is read once for all.
-    pub fn specular_planes(&self, lobes: &Lobes) -> Vec<Planes> {
-        self.planes(lobes, false)
-    }
-
-    /// All that each subject pixel shows of some materials, as [`Renderer::specular_planes`].
+    /// All that each subject pixel shows of some materials, for each as planes of linear red, green and blue.
     pub fn subject_planes(&self, lobes: &Lobes) -> Vec<Planes> {
-        self.planes(lobes, true)
+        self.planes(lobes, &|_| true)
     }
 
-    /// The planes of some materials: everything, or only what the lobes add to the diffuse part.
-    fn planes(&self, lobes: &Lobes, whole: bool) -> Vec<Planes> {
+    /// The planes of some materials: everything, or only what the lobes add to the Lambert term.
+    fn planes(&self, lobes: &Lobes, whole: &(dyn Fn(usize) -> bool + Sync)) -> Vec<Planes> {
         let materials = lobes.bsdfs.par_iter().zip(&lobes.expanded);
         let waiting: Vec<Option<Lobe>> =
-            materials.map(|(bsdf, expanded)| Some(self.lobe(*bsdf, expanded.as_ref()?))).collect();
+            materials.map(|(bsdf, expanded)| Some(self.lobe(&**bsdf, expanded.as_ref()?))).collect();
         let mut lit = self.lit(&waiting.iter().flatten().collect::<Vec<_>>()).into_iter();
         let lit: Vec<Option<(&Lobe, Planes)>> =
             waiting.iter().map(|lobe| lobe.as_ref().and_then(|lobe| Some((lobe, lit.next()?)))).collect();
-        lobes.bsdfs.par_iter().zip(lit).map(|(bsdf, lit)| self.finished(*bsdf, lit, whole)).collect()
+        let finished = |(k, (bsdf, lit)): (usize, (&Box<dyn Bsdf>, _))| self.finished(&**bsdf, lit, whole(k));
+        lobes.bsdfs.par_iter().zip(lit).enumerate().map(finished).collect()
     }
 
     /// What the rings made of a lobe, with all that they do not hold.

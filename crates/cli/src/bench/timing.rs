@@ -5,7 +5,7 @@ use std::hint::black_box;
 use anyhow::Context;
 use cpu_time::ThreadTime;
 use lookmatch_imaging::{FitnessWeights, lab_planes, squared_distance};
-use lookmatch_materials::{Bsdf, Material};
+use lookmatch_materials::Material;
 use lookmatch_rendering::{Lobes, Part, Renderer};
 use serde::Serialize;
 
@@ -67,9 +67,7 @@ fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> anyhow::Result<T> 
 fn cost(renderers: &[&Renderer], batches: &[Vec<Material>]) -> PictureCost {
     // From materials to everything that the subject's pixels hold, linear RGB.
     let render = |materials: &[Material]| {
-        let bsdfs: Vec<Box<dyn Bsdf>> = materials.iter().map(Material::bsdf).collect();
-        let bsdfs: Vec<&dyn Bsdf> = bsdfs.iter().map(|b| &**b).collect();
-        let lobes = Lobes::new(&bsdfs);
+        let lobes = Lobes::new(materials.iter().map(Material::bsdf).collect());
         renderers.iter().for_each(|renderer| drop(black_box(renderer.subject_planes(&lobes))));
     };
     let each = |milliseconds: f64| milliseconds / batches[0].len() as f64;

@@ -108,10 +108,7 @@ impl PathTracer {
             Part::Full => material.bsdf(),
             Part::DiffuseOnly => material.diffuse_only().bsdf(),
         };
-        let lobe = |sampling: lookmatch_materials::Sampling| {
-            let [u, v] = sampling.distribution.alpha;
-            Lobe { sampling, alpha: (u + v) / 2.0 }
-        };
+        let lobe = |sampling: lookmatch_materials::Sampling| Lobe { alpha: sampling.width(), sampling };
         let coat = Coat { bsdf: &*bsdf, diffuse: bsdf.diffuse().into(), lobe: bsdf.sampling().map(lobe) };
         let done = AtomicUsize::new(0);
         let pixel = |pixel: &u32| {

@@ -21,11 +21,10 @@ pub(super) struct Coat<'a> {
     pub(super) lobe: Option<Lobe>,
 }
 
-/// The specular lobe of a material.
-#[derive(Clone, Copy)]
+/// What a material has beside its Lambert term.
 pub(super) struct Lobe {
     pub(super) sampling: Sampling,
-    /// Width: the mean of those along tangent and bitangent.
+    /// Width of its narrowest part.
     pub(super) alpha: f64,
 }
 
@@ -49,7 +48,7 @@ pub(super) struct Vertex<'a> {
     wo: [f64; 3],
     diffuse: DVec3,
     /// `None` where there is no lobe.
-    lobe: Option<Lobe>,
+    lobe: Option<&'a Lobe>,
     shares: Shares,
     /// About the share of light that is reflected.
     pub(super) albedo: f64,
@@ -83,10 +82,10 @@ impl<'a> Vertex<'a> {
         // The checkerboard looks the same from everywhere.
         let is_board = at.surface == Surface::Plane;
         let wo = if is_board { [0.0, 0.0, 1.0] } else { to_local(&at.frame, to_viewer) };
-        let lobe = coat.lobe.filter(|_| !is_board);
+        let lobe = coat.lobe.as_ref().filter(|_| !is_board);
         let shares = Shares { lobe: 0.0, cosine: 1.0, spheres: 0.0 };
         let mut vertex = Self { at, coat, targets, wo, diffuse, lobe, shares, albedo: 0.0 };
-        let reflectance = vertex.lobe.map_or(0.0, |l| vertex.mirror_reflectance(&l));
+        let reflectance = vertex.lobe.map_or(0.0, |l| vertex.mirror_reflectance(l));
         vertex.shares = vertex.fair_shares(reflectance);
         vertex.albedo = reflectance + diffuse.max_element();
         vertex
@@ -109,7 +108,7 @@ impl<'a> Vertex<'a> {
         let [x, y, z] = self.wo;
         let Some(g) = Geometry::new([-x, -y, z], self.wo) else { return 0.0 };
         let value: f64 = self.coat.bsdf.specular(&g).iter().sum();
-        (value / 3.0 * g.cos_i() / lobe.sampling.density(&g)).clamp(1e-3, 1.0)
+        (value / 3.0 * g.cos_i() / lobe.sampling.density(g.wi, g.wo)).clamp(1e-3, 1.0)
     }
 
     /// The material of the subjects.
@@ -128,7 +127,7 @@ impl<'a> Vertex<'a> {
         let mut density = self.shares.cosine * cos * FRAC_1_PI;
         if let Some(lobe) = &self.lobe {
             value += DVec3::from(self.coat.bsdf.specular(&g)) * cos;
-            density += self.shares.lobe * lobe.sampling.density(&g);
+            density += self.shares.lobe * lobe.sampling.density(g.wi, g.wo);
         }
         if self.shares.spheres > 0.0 {
             density += self.shares.spheres * self.sphere_density(direction);
@@ -177,7 +176,7 @@ impl<'a> Vertex<'a> {
 
     /// The highlights that a sphere throws here, and their share of the directions towards it.
     fn glints(&self, sphere: (DVec3, f64)) -> (f64, impl Iterator<Item = Option<Glint>>) {
-        let alpha = self.coat.lobe.map_or(0.0, |l| l.alpha);
+        let alpha = self.coat.lobe.as_ref().map_or(0.0, |l| l.alpha);
         let share = if alpha > 0.0 && !self.targets.lights.is_empty() { GLINTS } else { 0.0 };
         let position = self.at.position;
         (share, self.targets.lights.iter().map(move |l| Glint::new(position, sphere, *l, alpha)))
