@@ -190,8 +190,8 @@ fn integrate(f: &dyn Fn(f64, f64) -> f64, [s0, s1, t0, t1]: [f64; 4], depth: usi
     };
     let area = [s0, s1, t0, t1];
     let (coarse, fine) = (rule(3, area), rule(4, area));
-    // The cell's own area is about 0.01: an error of 1e-5 of the total is a hundredth of a draw's noise.
-    if depth > 9 || depth > 1 && (coarse - fine).abs() < 1e-3 * fine + 1e-5 {
+    // Far below the noise of the draws in a cell.
+    if depth > 9 || depth > 2 && (coarse - fine).abs() < 3e-4 * fine + 1e-6 {
         return fine;
     }
     let (s, t) = (0.5 * (s0 + s1), 0.5 * (t0 + t1));

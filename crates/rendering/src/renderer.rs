@@ -41,7 +41,7 @@ pub enum Part {
 pub struct SplitPlanes {
     /// For each material, what its picture has beyond the diffuse one.
     pub specular: Vec<Planes>,
-    /// Pictures of the diffuse reflections that differ: see [`SplitLobes::diffuse_place`].
+    /// Pictures of the diffuse reflections that differ, with what is behind the subjects at their silhouettes: see [`SplitLobes::diffuse_place`].
     pub diffuse: Vec<Planes>,
 }
 
@@ -229,14 +229,23 @@ impl Renderer {
     /// What each subject pixel shows of some materials, split into diffuse and specular reflection: the prepared light is
     /// read once for all.
     pub fn split_planes(&self, lobes: &SplitLobes) -> SplitPlanes {
-        let diffuse = self.subject_planes(&lobes.diffuse);
+        let mut diffuse = self.subject_planes(&lobes.diffuse);
         let mut specular = self.planes(&lobes.whole, &|material| !lobes.is_plain[material]);
         specular.par_iter_mut().enumerate().filter(|(k, _)| !lobes.is_plain[*k]).for_each(|(k, planes)| {
             for (plane, diffuse) in planes.iter_mut().zip(&diffuse[lobes.diffuse_of[k]]) {
                 plane.iter_mut().zip(diffuse).for_each(|(whole, diffuse)| *whole -= diffuse);
             }
         });
+        diffuse.par_iter_mut().for_each(|planes| self.add_background(planes));
         SplitPlanes { specular, diffuse }
+    }
+
+    /// Adds what is seen beside the subjects in the pixels that they share with it.
+    fn add_background(&self, planes: &mut Planes) {
+        for (k, pixel) in self.subjects.iter().enumerate() {
+            let background = self.background[*pixel as usize];
+            (0..3).for_each(|c| planes[c][k] += background[c]);
+        }
     }
 
     /// All that each subject pixel shows of some materials, for each as planes of linear red, green and blue.
