@@ -45,6 +45,11 @@ pub(crate) struct Json {
 
 #[derive(Args)]
 pub(crate) struct ModelsArgs {
+    /// Only this model, with its presets
+    pub(crate) model: Option<String>,
+    /// Print the catalogue as Markdown: docs/models.md
+    #[arg(long, conflicts_with_all = ["json", "model"])]
+    pub(crate) markdown: bool,
     #[command(flatten)]
     pub(crate) json: Json,
 }
@@ -105,7 +110,7 @@ pub(crate) enum PresetName {
 
 #[derive(Args)]
 pub(crate) struct RemapArgs {
-    /// Source model, with fixed values if wanted: ward, ward:variant=duer
+    /// Source model, with fixed values if wanted: ward, ward:variant=duer; or one material: low-abc@chrome
     pub(crate) from: String,
     /// Target model, with fixed values if wanted: ggx, ggx:masking=correlated
     pub(crate) to: String,
@@ -150,8 +155,8 @@ pub(crate) struct RemapArgs {
 pub(crate) struct ApplyArgs {
     /// The probe file
     pub(crate) probe: PathBuf,
-    /// Source parameters: NAME=VALUE
-    #[arg(required = true, value_name = "NAME=VALUE")]
+    /// Source parameters: NAME=VALUE; none where the probe's source is a single material
+    #[arg(value_name = "NAME=VALUE")]
     pub(crate) values: Vec<String>,
     /// Move values outside the probe's range to its nearest end
     #[arg(long)]

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use lookmatch_remap::{Loss, LossClass};
 use serde::Serialize;
 
 /// Prints a text. A reader that went away (`| head`) is no error.
@@ -38,6 +39,25 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
         }
         text += line.trim_end();
         text.push('\n');
+    }
+    text
+}
+
+/// What becomes of the source's parameters, one line each.
+pub(crate) fn loss_table(losses: &[Loss]) -> String {
+    let class = |loss: &Loss| match loss.class {
+        LossClass::Exact => "exact",
+        LossClass::Bounded => "bounded",
+        LossClass::Lost => "lost",
+    };
+    let mut text = String::new();
+    let width = losses.iter().map(|loss| loss.parameter.len()).max().unwrap_or(0);
+    for loss in losses {
+        text += &format!("  {:<width$}  {:<7}  {}\n", loss.parameter, class(loss), loss.reason);
+    }
+    if let Some([mean, worst]) = losses.iter().find_map(|loss| loss.nrmsd) {
+        text +=
+            &format!("  what is bounded or lost: masked NRMSD {mean:.4} on average, {worst:.4} at worst\n");
     }
     text
 }

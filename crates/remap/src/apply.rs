@@ -102,8 +102,10 @@ fn check_fixed(probe: &Probe, source: &Material) -> Result<(), RemapError> {
         probe.source_axes.iter().map(|a| model.resolve(&a.name)).collect::<Result<Vec<_>, _>>()?.concat();
     for (index, parameter) in model.parameters.iter().enumerate() {
         let (given, held) = (&source.values()[index], &probe.from.values()[index]);
-        let carried =
-            [Role::DiffuseReflectance, Role::ConductorIndex, Role::Extinction].contains(&parameter.role);
+        let carried = matches!(
+            parameter.role,
+            Role::DiffuseReflectance | Role::BaseColour | Role::ConductorIndex | Role::Extinction
+        );
         if !free.contains(&index) && !carried && given != held {
             let varying = match parameter.kind {
                 Kind::Choice { .. } => "found for another choice of".to_owned(),

@@ -97,6 +97,40 @@ impl Default for Options {
     }
 }
 
+/// One end of a remap.
+#[derive(Clone, Debug)]
+pub enum Endpoint {
+    /// A model: as a source, tabulated over some of its parameters.
+    Model(&'static Model),
+    /// A named material, `low-abc@chrome`.
+    Named(Material),
+}
+
+impl Endpoint {
+    /// Reads `MODEL` or `MODEL@PRESET`.
+    ///
+    /// # Errors
+    /// An unknown name.
+    pub fn parse(text: &str) -> Result<Self, RemapError> {
+        let material = Material::named(text)?;
+        Ok(if text.contains('@') { Self::Named(material) } else { Self::Model(material.model()) })
+    }
+
+    fn model(&self) -> &'static Model {
+        match self {
+            Self::Model(model) => model,
+            Self::Named(material) => material.model(),
+        }
+    }
+
+    fn material(&self) -> Material {
+        match self {
+            Self::Model(model) => Material::new(model),
+            Self::Named(material) => material.clone(),
+        }
+    }
+}
+
 /// A remap, fully determined: two equal plans give equal probes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -144,9 +178,20 @@ impl Plan {
     /// # Errors
     /// An option that names a parameter of neither model, or a lattice outside a parameter's range.
     pub fn new(from: &'static Model, to: &'static Model, options: &Options) -> Result<Self, RemapError> {
+        Self::between(Endpoint::Model(from), Endpoint::Model(to), options)
+    }
+
+    /// [`Plan::new`] between models or named materials: a named source is one material, and a named target gives the values
+    /// that are not searched.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn between(from: Endpoint, to: Endpoint, options: &Options) -> Result<Self, RemapError> {
         lookmatch_search::by_name(&options.search).map_err(|e| RemapError::Option(e.to_string()))?;
-        let mut source = Draft::new(Material::new(from), from.surveyed, |r| r.survey)?;
-        let mut target = Draft::new(Material::new(to), to.searched, |r| r.search)?;
+        let surveyed = if let Endpoint::Model(model) = from { model.surveyed } else { &[] };
+        let mut source = Draft::new(from.material(), surveyed, |r| r.survey)?;
+        let mut target = Draft::new(to.material(), to.model().searched, |r| r.search)?;
+        let (from, to) = (from.model(), to.model());
         check_names(options, from, to)?;
         for vary in &options.vary {
             let draft = pick(vary.side, &vary.name, &mut source, &mut target)?;
@@ -372,14 +417,19 @@ impl Draft {
         Ok(())
     }
 
-    /// Searches the parameters behind an alias (`roughness_u` and `roughness_v` behind `roughness`) one by one where the
-    /// source does not tie them: an anisotropic source has an anisotropic target.
+    /// An anisotropic source has an anisotropic target: searches how much longer the lobe is one way than the other, and the
+    /// parameters behind an alias (`roughness_u` and `roughness_v` behind `roughness`) one by one.
     fn follow(&mut self, source: &Draft) -> Result<(), RemapError> {
         let model = self.fixed.model();
+        let is_brushed = !source.fixed.bsdf().is_isotropic();
+        let anisotropy = model.parameters.iter().find(|p| p.role == Role::Anisotropy);
+        if let Some(parameter) = anisotropy.filter(|p| is_brushed && !self.held.contains(&p.name)) {
+            self.vary_by_default(parameter.name, |range| range.search)?;
+        }
         for alias in model.aliases {
             let is_tied =
                 self.axes.iter().any(|a| a.name == alias.name) && !self.given.iter().any(|n| n == alias.name);
-            if !is_tied || source.ties(alias.parameters)? {
+            if !is_tied || !is_brushed && source.ties(alias.parameters)? {
                 continue;
             }
             for name in alias.parameters {

@@ -1,17 +1,23 @@
 //! `lookmatch inspect`: what is in a probe.
 
-use lookmatch_remap::{Axis, Entry, Probe};
+use lookmatch_remap::{Axis, Entry, Probe, losses};
 use serde_json::json;
 
 use crate::args::InspectArgs;
-use crate::output::{print, print_json, score, table};
+use crate::output::{loss_table, print, print_json, score, table};
 
 /// Worst points that are listed.
 const WORST: usize = 5;
 
 pub(crate) fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let probe = Probe::read(&args.probe)?;
-    if args.json.json { print_json(&summary(&probe)) } else { print(&text(&probe)) }
+    let losses = losses(&probe)?;
+    if args.json.json {
+        let mut summary = summary(&probe);
+        summary["losses"] = json!(losses);
+        return print_json(&summary);
+    }
+    print(&format!("{}\nparameters of the source:\n{}", text(&probe), loss_table(&losses)))
 }
 
 fn summary(probe: &Probe) -> serde_json::Value {

@@ -5,29 +5,29 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::Context;
-use lookmatch_materials::{Model, by_name};
 use lookmatch_remap::{
-    Assignment, Event, Options, Plan, Preset, Probe, Side, Stage, Strategy, journal_path, remap,
+    Assignment, Endpoint, Event, Options, Plan, Preset, Probe, Side, Stage, Strategy, journal_path, losses,
+    remap,
 };
 use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::{check_output, create_folder};
-use crate::output::{bar, print_json};
+use crate::output::{bar, loss_table, print_json};
 use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
 
 pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
-    let (from, mut fix) = model(&args.from, Side::Source)?;
-    let (to, target_fix) = model(&args.to, Side::Target)?;
+    let (from, mut fix) = endpoint(&args.from, Side::Source)?;
+    let (to, target_fix) = endpoint(&args.to, Side::Target)?;
     fix.extend(target_fix);
     fix.extend(args.fix.iter().cloned());
-    let plan = Plan::new(from, to, &options(args, fix))?;
+    let plan = Plan::between(from, to, &options(args, fix))?;
     check_output(&args.output)?;
     if let Some(folder) = &args.report {
         create_folder(folder)?;
     }
-    if from.has_fresnel != to.has_fresnel && !args.mask {
+    if plan.from.model().has_fresnel != plan.to.model().has_fresnel && !args.mask {
         eprintln!(
             "note: only one of the models has a Fresnel effect; --mask keeps silhouettes from ruling the match"
         );
@@ -43,6 +43,8 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         args.output.display(),
         probe.entries.len(),
     );
+    let losses = losses(&probe)?;
+    eprint!("{}", loss_table(&losses));
     let validation = match &args.report {
         Some(folder) => Some(report::write(&probe, folder)?),
         None => None,
@@ -51,7 +53,7 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         let summary = json!({
             "probe": args.output, "source_points": probe.entries.len(), "seconds": seconds,
             "evaluations": probe.totals.evaluations, "lattice_points": probe.totals.lattice_points,
-            "mean_fitness": mean, "saturated": saturated, "validation": validation,
+            "mean_fitness": mean, "saturated": saturated, "losses": losses, "validation": validation,
         });
         return print_json(&summary);
     }
@@ -102,15 +104,14 @@ fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
     }
 }
 
-/// A model with values to hold: `ward` or `ward:variant=duer`.
-fn model(text: &str, side: Side) -> anyhow::Result<(&'static Model, Vec<Assignment>)> {
+/// A model or a named material with values to hold: `ward`, `ward:variant=duer` or `low-abc@chrome`.
+fn endpoint(text: &str, side: Side) -> anyhow::Result<(Endpoint, Vec<Assignment>)> {
     let (name, list) = text.split_once(':').unwrap_or((text, ""));
-    let model = by_name(name)?;
     let mut fix = Vec::new();
     for item in list.split(',').filter(|item| !item.is_empty()) {
         let (name, value) =
             item.split_once('=').ok_or_else(|| Usage(format!("'{item}' in '{text}' is not NAME=VALUE")))?;
         fix.push(Assignment { side: Some(side), name: name.trim().into(), value: value.trim().into() });
     }
-    Ok((model, fix))
+    Ok((Endpoint::parse(name.trim())?, fix))
 }
