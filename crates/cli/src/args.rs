@@ -24,6 +24,8 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Find the probe that maps one model to another
     Remap(RemapArgs),
+    /// Map every model to every other, and compare each probe with copied parameters
+    Pairs(PairsArgs),
     /// Map one material through a probe
     Apply(ApplyArgs),
     /// Say what is in a probe
@@ -145,6 +147,27 @@ pub(crate) struct RemapArgs {
     #[arg(long, value_name = "FOLDER")]
     pub(crate) report: Option<PathBuf>,
     /// The probe file
+    #[arg(short, long)]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct PairsArgs {
+    /// Only these models, as sources and as targets; all if not given
+    #[arg(value_name = "MODEL")]
+    pub(crate) models: Vec<String>,
+    /// Side of the reference pictures in pixels
+    #[arg(long, default_value_t = 64)]
+    pub(crate) size: usize,
+    /// Seed of all random decisions
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Weight the middle of the sphere more than its silhouette
+    #[arg(long)]
+    pub(crate) mask: bool,
+    /// Folder for pairs.md, pairs.svg and pairs.json; a run that was stopped goes on from the last
     #[arg(short, long)]
     pub(crate) output: PathBuf,
     #[command(flatten)]

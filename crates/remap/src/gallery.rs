@@ -1,12 +1,13 @@
-//! Target materials that were rendered already: the paper's database of renderings, in memory and bounded.
+//! Materials that were rendered already: the paper's database of renderings, in memory and bounded.
 
 use std::collections::HashSet;
 use std::num::NonZeroUsize;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use lookmatch_materials::{Material, Role, Value};
-use lookmatch_search::{Objective, ObjectiveError, Point};
+use lookmatch_search::{Lattice, Objective, ObjectiveError, Point};
 use lru::LruCache;
+use rayon::prelude::*;
 
 use crate::stage::{Appearance, Stage};
 use crate::{Plan, RemapError};
@@ -14,7 +15,8 @@ use crate::{Plan, RemapError};
 /// Memory for kept appearances, in bytes.
 const CAPACITY: usize = 500 << 20;
 
-/// What an appearance depends on: the bits of every value, or those of the albedo where there is no more than that.
+/// What an appearance depends on: the model and the bits of every value, or those of the albedo where there is no more than
+/// that.
 pub(crate) type Key = Vec<u64>;
 
 pub(crate) fn key(material: &Material) -> Key {
@@ -24,63 +26,56 @@ pub(crate) fn key(material: &Material) -> Key {
             return bsdf.diffuse().map(f64::to_bits).to_vec();
         }
     }
-    material.values().iter().flat_map(Value::bits).collect()
+    let model = material.model().name.bytes().map(u64::from);
+    model.chain(material.values().iter().flat_map(Value::bits)).collect()
 }
 
-/// The most recently used target appearances.
-pub(crate) struct Gallery<'a> {
-    plan: &'a Plan,
-    stage: &'a Stage,
-    lattice: &'a lookmatch_search::Lattice,
-    kept: LruCache<Key, Arc<Appearance>>,
+/// The most recently used appearances of a stage.
+pub(crate) struct Gallery {
+    kept: Mutex<LruCache<Key, Arc<Appearance>>>,
 }
 
-impl<'a> Gallery<'a> {
-    pub(crate) fn new(plan: &'a Plan, stage: &'a Stage, lattice: &'a lookmatch_search::Lattice) -> Self {
-        let count =
-            NonZeroUsize::new(CAPACITY / stage.appearance_bytes().max(1)).unwrap_or(NonZeroUsize::MIN);
-        Self { plan, stage, lattice, kept: LruCache::new(count) }
+impl Gallery {
+    /// Room for appearances of a size in bytes.
+    pub(crate) fn new(appearance_bytes: usize) -> Self {
+        let count = NonZeroUsize::new(CAPACITY / appearance_bytes.max(1)).unwrap_or(NonZeroUsize::MIN);
+        Self { kept: Mutex::new(LruCache::new(count)) }
     }
 
-    /// A source material as it is seen.
-    pub(crate) fn appearance(&self, source: &Material) -> Appearance {
-        self.stage.appearance(source)
+    fn find(&self, key: &Key) -> Option<Arc<Appearance>> {
+        // A panic elsewhere leaves nothing half-written in this map.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).get(key).cloned()
     }
 
-    /// The appearances of target materials at some points beside a source.
-    fn look(&mut self, source: &Material, points: &[Point]) -> Result<Vec<Arc<Appearance>>, RemapError> {
-        let materials = points
-            .iter()
-            .map(|p| self.plan.target_material(source, &self.lattice.values(p)))
-            .collect::<Result<Vec<_>, _>>()?;
+    /// Materials as they are seen on a stage; what is not known yet is rendered.
+    pub(crate) fn look(&self, stage: &Stage, materials: &[Material]) -> Vec<Arc<Appearance>> {
         let wanted: Vec<Key> = materials.iter().map(key).collect();
-        let mut missing: Vec<(Key, Material)> = Vec::new();
-        for (key, material) in wanted.iter().zip(&materials) {
-            if !self.kept.contains(key) && missing.iter().all(|(known, _)| known != key) {
-                missing.push((key.clone(), material.clone()));
+        // Everything is looked up before anything is stored: a large batch must not push out its own members.
+        let known: Vec<Option<Arc<Appearance>>> = wanted.iter().map(|key| self.find(key)).collect();
+        let mut missing: Vec<usize> = Vec::new();
+        for k in (0..materials.len()).filter(|k| known[*k].is_none()) {
+            if missing.iter().all(|other| wanted[*other] != wanted[k]) {
+                missing.push(k);
             }
         }
-        let (keys, new): (Vec<_>, Vec<_>) = missing.into_iter().unzip();
-        let rendered = self.stage.appearances(&new).into_iter().map(Arc::new);
-        let fresh: Vec<(Key, Arc<Appearance>)> = keys.into_iter().zip(rendered).collect();
-        // Everything is looked up before anything is stored: a large batch must not push out its own members.
-        let mut seen = Vec::with_capacity(points.len());
-        for (key, material) in wanted.iter().zip(materials) {
-            let new = fresh.iter().find(|(k, _)| k == key).map(|(_, appearance)| appearance.clone());
-            let appearance = new.or_else(|| self.kept.get(key).cloned());
-            let appearance = appearance.unwrap_or_else(|| Arc::new(self.stage.appearance(&material)));
-            seen.push(appearance);
-        }
-        for (key, appearance) in fresh {
-            self.kept.put(key, appearance);
-        }
-        Ok(seen)
+        let new: Vec<Material> = missing.iter().map(|k| materials[*k].clone()).collect();
+        let rendered: Vec<Arc<Appearance>> = stage.appearances(&new).into_iter().map(Arc::new).collect();
+        let fresh = |key: &Key| missing.iter().position(|k| wanted[*k] == *key).map(|i| rendered[i].clone());
+        let seen =
+            known.into_iter().zip(&wanted).filter_map(|(known, key)| known.or_else(|| fresh(key))).collect();
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        missing.iter().zip(rendered).for_each(|(k, appearance)| {
+            kept.put(wanted[*k].clone(), appearance);
+        });
+        seen
     }
 }
 
 /// The fitness of target points against one source material.
-pub(crate) struct Match<'a, 'b> {
-    pub(crate) gallery: &'a mut Gallery<'b>,
+pub(crate) struct Match<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) stage: &'a Stage,
+    pub(crate) lattice: &'a Lattice,
     pub(crate) source: &'a Material,
     pub(crate) appearance: &'a Appearance,
     /// Points that were compared so far, also by an earlier search of the same source.
@@ -94,16 +89,15 @@ pub(crate) struct Match<'a, 'b> {
 #[error("stopped")]
 pub(crate) struct Stopped;
 
-impl Objective for Match<'_, '_> {
+impl Objective for Match<'_> {
     fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, ObjectiveError> {
-        use rayon::prelude::*;
         if (self.stop)() {
             return Err(Box::new(Stopped));
         }
         self.compared.extend(points.iter().cloned());
-        let targets = self.gallery.look(self.source, points)?;
-        let stage = self.gallery.stage;
-        let fitness = |appearance: &Arc<Appearance>| stage.fitness(self.appearance, appearance);
-        Ok(targets.par_iter().map(fitness).collect())
+        let material = |p: &Point| self.plan.target_material(self.source, &self.lattice.values(p));
+        let targets = points.iter().map(material).collect::<Result<Vec<_>, RemapError>>()?;
+        let seen = self.stage.known_appearances(&targets);
+        Ok(seen.par_iter().map(|seen| self.stage.fitness(self.appearance, seen)).collect())
     }
 }

@@ -10,6 +10,7 @@ use lookmatch_rendering::{
 };
 use rayon::prelude::*;
 
+use crate::gallery::Gallery;
 use crate::projection::{Projection, Sketches};
 use crate::{Plan, RemapError};
 
@@ -36,6 +37,8 @@ pub struct Stage {
     metric: Fitness,
     /// Mask weights on the subject's pixels.
     weights: Option<Vec<f32>>,
+    /// Appearances that may be asked for again.
+    gallery: Gallery,
     /// The diffuse images of appearances that still exist.
     diffuse: Mutex<HashMap<DiffuseKey, Weak<Images>>>,
 }
@@ -70,12 +73,8 @@ impl Stage {
         let on_subject = |weights: &[f32]| point.subjects().iter().map(|i| weights[*i as usize]).collect();
         let weights = plan.mask.then(|| on_subject(point.mask().weights()));
         let diffuse = Mutex::new(HashMap::new());
-        Ok(Self { metric: plan.metric, weights, diffuse, point, environment })
-    }
-
-    /// Size of an [`Appearance`] with diffuse images of its own: three planes of two images under each of two lights.
-    pub(crate) fn appearance_bytes(&self) -> usize {
-        2 * 2 * 3 * self.point.subjects().len() * size_of::<f32>()
+        let gallery = Gallery::new(appearance_bytes(&point));
+        Ok(Self { metric: plan.metric, weights, gallery, diffuse, point, environment })
     }
 
     /// Renders materials, on all cores, in their order.
@@ -94,6 +93,11 @@ impl Stage {
             }),
         };
         (0..materials.len()).into_par_iter().map(appearance).collect()
+    }
+
+    /// [`Stage::appearances`] that keeps what it renders for the next time.
+    pub(crate) fn known_appearances(&self, materials: &[Material]) -> Vec<Arc<Appearance>> {
+        self.gallery.look(self, materials)
     }
 
     /// Renders one material.
@@ -207,6 +211,11 @@ impl Stage {
         };
         (sum / (self.point.size() * self.point.size()) as f64).sqrt()
     }
+}
+
+/// Size of an [`Appearance`] with diffuse images of its own: three planes of two images under each of two lights.
+fn appearance_bytes(renderer: &Renderer) -> usize {
+    2 * 2 * 3 * renderer.subjects().len() * size_of::<f32>()
 }
 
 fn lab([r, g, b]: &Planes) -> Vec<f32> {

@@ -9,7 +9,7 @@ use lookmatch_search::{
 };
 use rayon::prelude::*;
 
-use crate::gallery::{Gallery, Match, Stopped};
+use crate::gallery::{Match, Stopped};
 use crate::journal::Journal;
 use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
@@ -87,7 +87,6 @@ fn run(
         observe(Event::Resumed { done: resumed });
     }
     let pairing = Pairing::new(plan)?;
-    let mut gallery = Gallery::new(plan, stage, &lattice);
     let table = if certified && resumed < total {
         let table = FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop);
         table.map_err(|e| interrupted(e, resumed, total))?
@@ -112,7 +111,7 @@ fn run(
         let searched = match &table {
             Some(table) => search_all(plan, table, &values, problems, stop),
             None => (values.iter().zip(&problems))
-                .map(|(values, problem)| search_one(plan, &mut gallery, values, problem, stop))
+                .map(|(values, problem)| search_one(plan, stage, values, problem, stop))
                 .map(|outcome| outcome.map(|outcome| Found { compared: outcome.evaluations, outcome }))
                 .collect(),
         };
@@ -180,15 +179,15 @@ fn search_all(
 /// Searches the target of one source point.
 fn search_one(
     plan: &Plan,
-    gallery: &mut Gallery,
+    stage: &Stage,
     values: &[f64],
     problem: &Problem,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Outcome, RemapError> {
     let source = plan.source_material(values)?;
-    let appearance = gallery.appearance(&source);
-    let compared = HashSet::new();
-    let mut objective = Match { gallery, source: &source, appearance: &appearance, compared, stop };
+    let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
+    let (lattice, compared) = (problem.lattice, HashSet::new());
+    let mut objective = Match { plan, stage, lattice, source: &source, appearance, compared, stop };
     let mut run = |method: &dyn Search| method.run(problem, &mut objective).map_err(RemapError::Search);
     if plan.search != "genetic" || problem.guesses.is_empty() {
         return run(&*by_name(&plan.search).map_err(RemapError::Search)?);

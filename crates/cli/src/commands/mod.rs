@@ -6,6 +6,7 @@ pub(crate) mod compare;
 pub(crate) mod eval;
 pub(crate) mod inspect;
 pub(crate) mod models;
+pub(crate) mod pairs;
 pub(crate) mod remap;
 pub(crate) mod render;
 pub(crate) mod validate;
