@@ -11,6 +11,7 @@
 //! This crate does no input or output.
 
 pub mod bsdf;
+pub mod burley;
 pub mod conformance;
 pub mod distribution;
 mod error;
@@ -24,6 +25,7 @@ pub mod models;
 mod parameter;
 mod real;
 mod sampling;
+pub mod sheen;
 
 pub use bsdf::{Bsdf, Lobe};
 pub use error::MaterialError;
