@@ -2,6 +2,9 @@
 //!
 //! `f = D/(4 cos θ_i cos θ_o (1 + Λ(θ_i) + Λ(θ_o)))` with `D = (2 + 1/α) sin^(1/α) θ_h/(2π)`: most normals lie near the
 //! horizon, like those of fibres that stand on the surface.
+//!
+//! Known defect: the published fit of Λ does not bound the lobe's albedo by 1. Below α = 0.1 a grazing direction reflects more
+//! than arrives, three times as much at α = 0.005; from α = 0.1 on, less than 1 above cos θ = 0.001.
 
 use std::f64::consts::{PI, TAU};
 
@@ -18,7 +21,7 @@ pub struct Charlie {
     alpha: f64,
     /// Coefficients a to e of the fit of ln Λ, interpolated to α.
     fit: [f64; 5],
-    /// Directional albedo at `cos = (k/INTERVALS)²`.
+    /// Directional albedo at `cos = (k/INTERVALS)³`.
     albedo: Vec<f64>,
 }
 
@@ -34,8 +37,8 @@ impl Charlie {
         let narrow = [25.3245, 3.32435, 0.16801, -1.27393, -4.85967];
         let fit = std::array::from_fn(|k| mix(wide[k], narrow[k], (1.0 - alpha) * (1.0 - alpha)));
         let mut lobe = Self { alpha, fit, albedo: Vec::new() };
-        // The light may graze, but not lie in, the surface.
-        let cos = |k: usize| (k as f64 / INTERVALS as f64).powi(2).max(1e-6);
+        // The albedo has no limit in the surface itself: the first node lies a little above.
+        let cos = |k: usize| (k as f64 / INTERVALS as f64).powi(3).max(1e-6);
         lobe.albedo = (0..=INTERVALS).map(|k| lobe.integrate(cos(k))).collect();
         lobe
     }
@@ -51,14 +54,14 @@ impl Charlie {
         density / (T::of(4.0) * g.cos_i() * g.cos_o() * masking)
     }
 
-    /// Share of the light from a direction that the lobe reflects, 0 to 1: a table of quadratures, interpolated with an error
-    /// below 2e-4.
+    /// Share of the light from a direction that the lobe reflects, cut off at 1: a table of quadratures, interpolated with an
+    /// error below 1.5e-3.
     #[inline(always)]
     pub fn directional_albedo<T: Real>(&self, cos: T) -> T {
-        let at = cos.max(T::zero()).sqrt() * T::of(INTERVALS as f64);
+        let at = cos.max(T::zero()).cbrt() * T::of(INTERVALS as f64);
         let k = at.to_usize().unwrap_or(0).min(INTERVALS - 1);
         let node = |k: usize| T::of(self.albedo[k]);
-        mix(node(k), node(k + 1), at - T::of(k as f64))
+        mix(node(k), node(k + 1), at - T::of(k as f64)).min(T::one())
     }
 
     /// Smith's auxiliary function: the fit of Estevez & Kulla (2017), section 3, mirrored about cos = ½.
@@ -80,7 +83,7 @@ impl Charlie {
 
     /// The directional albedo by quadrature over all light directions.
     fn integrate(&self, cos_o: f64) -> f64 {
-        const ROWS: usize = 96;
+        const ROWS: usize = 48;
         const COLUMNS: usize = 32;
         let wo = [(1.0 - cos_o * cos_o).sqrt(), 0.0, cos_o];
         let mut sum = 0.0;
@@ -105,14 +108,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn albedo_is_below_one_and_between_its_nodes() {
+    fn interpolated_albedo_is_near_the_integral() {
         for roughness in [0.0, 0.1, 0.2, 0.35, 0.5, 0.8, 1.0f64] {
             let lobe = Charlie::new(roughness * roughness);
-            for k in 1..400 {
-                let cos = k as f64 / 400.0;
-                let (table, exact) = (lobe.directional_albedo(cos), lobe.integrate(cos));
-                assert!((0.0..1.0).contains(&exact), "{roughness} {cos} {exact}");
-                assert!((table - exact).abs() < 2e-4, "{roughness} {cos}: {table} {exact}");
+            for k in 1..200 {
+                let cos = k as f64 / 200.0;
+                let (table, exact) = (lobe.directional_albedo(cos), lobe.integrate(cos).min(1.0));
+                assert!((table - exact).abs() < 1.5e-3, "{roughness} at {cos}: {table} instead of {exact}");
             }
         }
     }
