@@ -4,7 +4,7 @@
 use crate::fresnel::{mix, schlick_weight};
 use crate::{Geometry, Real};
 
-/// Burley (2012), eq. 4 of the notes' section 5.3, without `colour/π`: darker towards grazing angles where the surface is
+/// The diffuse reflection of Burley (2012), section 5.3, without `colour/π`: darker towards grazing angles where the surface is
 /// smooth, brighter in retro-reflection where it is rough.
 #[inline(always)]
 pub fn diffuse<T: Real>(roughness: f64, g: &Geometry<T>) -> T {

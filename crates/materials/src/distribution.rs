@@ -13,7 +13,7 @@ pub enum Shape {
     Beckmann,
     /// Phong-type power of the cosine, exponent `2/α² − 2`: the "Ashikhmin–Shirley" distribution of Mitsuba 0.6.
     Phong,
-    /// GTR1 of Burley (2012), eq. 4: tails longer than those of any other. Isotropic, α below 1: both widths are the same.
+    /// GTR1 of Burley (2012), appendix B: tails longer than those of any other. Isotropic, α below 1: both widths are the same.
     Gtr1,
 }
 
@@ -102,7 +102,7 @@ impl Distribution {
                 (-2.0 * (-u[0]).ln_1p() / (exponent + 2.0)).exp_m1()
             }
             Shape::Gtr1 => {
-                // Burley (2012), eq. 5: cos² = (1 − α^(2 − 2u))/(1 − α²).
+                // Burley (2012), appendix B: cos² = (1 − α^(2 − 2u))/(1 − α²).
                 let power = ax.powf(2.0 * (1.0 - u[0]));
                 (power - ax * ax) / (1.0 - power)
             }

@@ -3,8 +3,8 @@
 //! `f = D/(4 cos θ_i cos θ_o (1 + Λ(θ_i) + Λ(θ_o)))` with `D = (2 + 1/α) sin^(1/α) θ_h/(2π)`: most normals lie near the
 //! horizon, like those of fibres that stand on the surface.
 //!
-//! Known defect: the published fit of Λ does not bound the lobe's albedo by 1. Below α = 0.1 a grazing direction reflects more
-//! than arrives, three times as much at α = 0.005; from α = 0.1 on, less than 1 above cos θ = 0.001.
+//! Known defect: the published fit of Λ does not bound the lobe's albedo by 1. Below α = 0.07 a grazing direction reflects
+//! more than arrives, three times as much at α = 0.005.
 
 use std::f64::consts::{PI, TAU};
 
@@ -32,7 +32,7 @@ impl Charlie {
     /// The lobe of width α from 0 to 1, [`Charlie::NARROWEST`] at least.
     pub fn new(alpha: f64) -> Self {
         let alpha = alpha.max(Self::NARROWEST);
-        // Estevez & Kulla (2017), table 1: the fits for α = 1 and α = 0, blended with (1 − α)².
+        // The fits for α = 1 and α = 0, blended with (1 − α)².
         let wide = [21.5473, 3.82987, 0.19823, -1.97760, -4.32054];
         let narrow = [25.3245, 3.32435, 0.16801, -1.27393, -4.85967];
         let fit = std::array::from_fn(|k| mix(wide[k], narrow[k], (1.0 - alpha) * (1.0 - alpha)));
@@ -64,7 +64,7 @@ impl Charlie {
         mix(node(k), node(k + 1), at - T::of(k as f64)).min(T::one())
     }
 
-    /// Smith's auxiliary function: the fit of Estevez & Kulla (2017), section 3, mirrored about cos = ½.
+    /// Smith's auxiliary function: the fit of Estevez & Kulla (2017), mirrored about cos = ½.
     #[inline(always)]
     fn lambda<T: Real>(&self, cos: T) -> T {
         let half = T::of(0.5);

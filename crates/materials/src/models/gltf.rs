@@ -25,18 +25,19 @@
 //!
 //! Sources: glTF 2.0.1, Appendix B; the ratified texts of the five extensions (KhronosGroup/glTF, `extensions/2.0/Khronos`).
 //!
-//! Deviations: α is at least 0.001, that of the sheen at least 0.005. E comes from a quadrature of the lobe, not from
-//! the table that the sheen's text refers to. The visibility of the anisotropy's sample code is cut off at 1, which darkens
-//! everything but steep views; here it is not. `anisotropyRotation` is left out: turn the surface. The defaults are those
-//! of an ordinary plastic; the format's own (1, 1, 1) mean a rough white metal.
+//! Deviations: α is at least 0.001, that of the sheen at least 0.005. E comes from a quadrature of the lobe, not from the
+//! table that the sheen's text refers to. The visibility of the anisotropy's sample code is cut off at 1, which it passes
+//! where both cosines are below a half; here it is not. `anisotropyRotation` is left out: turn the surface. The defaults
+//! are those of an ordinary plastic; the format's own (1, 1, 1) mean a rough white metal.
 //!
 //! Checked: the core model by the public vectors; specular, sheen, clear coat and anisotropy against the Khronos
 //! sample viewer's BRDF functions (`tests/vectors/make_shaders.py`). How the layers are put together follows the texts and is
 //! checked only by a second writing of them there.
 //!
-//! Known defects: the clear coat's weight depends on the view alone, so light and viewer cannot be swapped; the coupling
-//! of the diffuse reflection by cos θ_d lets bright dielectrics reflect more than arrives at grazing angles; light that bounces
-//! between microfacets is lost.
+//! Known defects: the clear coat's weight depends on the view alone, so light and viewer cannot be swapped; the coupling of
+//! the diffuse reflection by cos θ_d lets white dielectrics reflect up to 1.7 times what arrives (roughness 0.1, cos θ =
+//! 0.02); a narrow sheen reflects more than arrives by itself ([`crate::sheen`]); light that bounces between microfacets is
+//! lost.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -287,4 +288,25 @@ pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
         ggx([p.number("roughness")?.powi(2); 2]),
         masking,
     )))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use crate::Material;
+
+    #[test]
+    fn without_its_lobes_it_is_lambert() {
+        let text = "gltf:base_color=0.8,metallic=0.5,clearcoat=0.3,sheen_color=0.2,roughness=0.1";
+        let bsdf = Material::parse(text).unwrap().diffuse_only().bsdf();
+        let f = bsdf.evaluate([0.6, 0.0, 0.8], [-0.8, 0.0, 0.6]);
+        assert!(f.iter().all(|v| (v - 0.4 / PI).abs() < 1e-15), "{f:?}");
+    }
+
+    #[test]
+    fn an_index_below_one_is_refused_but_for_zero() {
+        assert!(Material::parse("gltf:ior=0").is_ok());
+        assert!(Material::parse("gltf:ior=0.5").unwrap_err().to_string().contains("1 or more"));
+    }
 }

@@ -20,7 +20,8 @@
 //! Checked against the Khronos sample viewer's BRDF functions (`tests/vectors/make_shaders.py`).
 //!
 //! Known defects: `specular = 0` leaves the reflection at grazing half angles, and so does the material's diffuse part
-//! alone; the diffuse reflection loses energy to the lobe twice, in c and in `1 − F`.
+//! alone; white dielectrics reflect up to 1.3 times what arrives (glossiness 0.7, cos θ = 0.02), although the diffuse
+//! reflection loses energy to the lobe twice, in c and in `1 − F`.
 
 use std::f64::consts::FRAC_1_PI;
 

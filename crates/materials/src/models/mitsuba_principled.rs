@@ -25,8 +25,8 @@
 //! Source: `src/bsdfs/principled.cpp` and `principledhelpers.h` of Mitsuba 3.9. Deviations: no transmission, so no `eta`
 //! below 1; at `eta = 1` Mitsuba drops the main lobe of a metal with that of the dielectric, here the metal stays.
 //!
-//! Known defects: the diffuse reflection is not coupled to the lobes, so smooth bright materials reflect more than arrives at
-//! grazing angles; the clear coat fades towards grazing angles for want of its denominator.
+//! Known defects: the diffuse reflection is not coupled to the lobes, so white dielectrics reflect up to 1.2 times what
+//! arrives (roughness 0.3, cos θ = 0.1); the clear coat lacks the brightness at grazing angles that its denominator would give.
 
 use std::f64::consts::FRAC_1_PI;
 

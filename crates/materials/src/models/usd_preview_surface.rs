@@ -22,10 +22,10 @@
 //! | `ior` | ior | index of the dielectric and of the clear coat | 1.5 |
 //! | `variant` | – | `exact` or `storm` | exact |
 //!
-//! Source: UsdPreviewSurface Specification 2.6. It defines F0 and F90, Schlick's Fresnel term between them, the mixing of
-//! metals, and that roughness is squared "before use with a GGX or Beckmann lobe"; MaterialX gives it version 2.6, too. On all
-//! else it is silent, and the reference renderer decides: Storm, `previewSurface.glslfx` of OpenUSD. From there are
-//! GGX, Schlick's masking, the factor `1 − F` per channel, and that the clear coat is added without darkening what it covers.
+//! Source: UsdPreviewSurface Specification 2.5 (2.6 adds an input for opacity). It defines F0 and F90, Schlick's Fresnel
+//! term between them, the mixing of metals, and that roughness is squared "before use with a GGX or Beckmann lobe". On all
+//! else it is silent, and the reference renderer decides: Storm, `previewSurface.glslfx` of OpenUSD. From there are GGX,
+//! Schlick's masking, the factor `1 − F` per channel, and that the clear coat is added without darkening what it covers.
 //! (MaterialX's graph of the same name has Smith masking, compensated energy and albedo scaling, which are its own.)
 //!
 //! `storm` is Storm's code to the letter: π is 3.1415, and 0.001 is added to the numerator of D and to the denominator
@@ -37,8 +37,9 @@
 //!
 //! Checked against Storm's code, with and without its guards (`tests/vectors/make_shaders.py`).
 //!
-//! Known defects: a clear coat adds energy; F90 is 1, so a `specular_color` of 0 leaves the reflection at grazing half
-//! angles, and so does the material's diffuse part alone.
+//! Known defects: white dielectrics reflect up to 1.24 times what arrives (roughness 0.3, cos θ = 0.02), with a clear coat
+//! 2.1 times; `storm` up to 6 times (roughness 0.1, black). F90 is 1, so a `specular_color` of 0 leaves the reflection at
+//! grazing half angles, and so does the material's diffuse part alone.
 
 use std::f64::consts::PI;
 
@@ -57,7 +58,7 @@ pub static MODEL: Model = Model {
     name: "usd-preview-surface",
     title: "UsdPreviewSurface",
     summary: "The material that USD files are exchanged with, as Storm renders it.",
-    reference: "UsdPreviewSurface Specification 2.6; OpenUSD previewSurface.glslfx",
+    reference: "UsdPreviewSurface Specification 2.5; OpenUSD previewSurface.glslfx",
     family: Family::Production,
     parameters: &[
         unit_colour(
