@@ -25,8 +25,8 @@
 //!
 //! Sources: glTF 2.0.1, Appendix B; the ratified texts of the five extensions (KhronosGroup/glTF, `extensions/2.0/Khronos`).
 //!
-//! Deviations: α is at least 0.001, that of the sheen at least 0.005. E comes from a quadrature of the lobe, not from the
-//! table that the sheen's text refers to. The visibility of the anisotropy's sample code is cut off at 1, which it passes
+//! Deviations: α is at least 0.001, that of the sheen at least 0.005. E comes from a quadrature of the lobe, cut off at
+//! 1, not from the table that the sheen's text refers to. The visibility of the anisotropy's sample code is cut off at 1, which it passes
 //! where both cosines are below a half; here it is not. `anisotropyRotation` is left out: turn the surface. The defaults
 //! are those of an ordinary plastic; the format's own (1, 1, 1) mean a rough white metal.
 //!

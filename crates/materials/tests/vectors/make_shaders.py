@@ -4,7 +4,8 @@
 
 BRDF_GLSL is source/Renderer/shaders/brdf.glsl of KhronosGroup/glTF-Sample-Viewer (commit d0b428c), PREVIEW_SURFACE_GLSLFX is
 pxr/usdImaging/plugin/usdShaders/shaders/previewSurface.glslfx of PixarAnimationStudios/OpenUSD (commit 00dd17a). Both are
-compiled as C++ (g++ 12) with every `float` a double. What runs of them:
+compiled as C++ (g++ 12) with every `float` a double. The values in shaders.json come from copies of the two files reduced by
+hand to the functions that are named here. What runs of them:
 
 * glTF: Fresnel, D and V of GGX, isotropic and anisotropic, D and Λ of the sheen, the Lambert term. How they are put together
   is written below from the texts of the extensions: a second writing, not an independent one. The viewer cuts its
