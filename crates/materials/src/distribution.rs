@@ -13,6 +13,8 @@ pub enum Shape {
     Beckmann,
     /// Phong-type power of the cosine, exponent `2/α² − 2`: the "Ashikhmin–Shirley" distribution of Mitsuba 0.6.
     Phong,
+    /// GTR1 of Burley (2012), appendix B: tails longer than those of any other. Isotropic, α below 1: both widths are the same.
+    Gtr1,
 }
 
 /// A distribution of microfacet normals with its widths.
@@ -25,6 +27,11 @@ pub struct Distribution {
 }
 
 impl Distribution {
+    /// A distribution as wide along the tangent as along the bitangent.
+    pub const fn isotropic(shape: Shape, alpha: f64) -> Self {
+        Self { shape, alpha: [alpha; 2] }
+    }
+
     /// True where both widths are the same.
     pub fn is_isotropic(&self) -> bool {
         self.alpha[0] == self.alpha[1]
@@ -58,6 +65,12 @@ impl Distribution {
                 let power = (-T::of(0.5) * exponent * tan2.ln_1p()).exp();
                 ((eu + T::of(2.0)) * (ev + T::of(2.0))).sqrt() * T::of(1.0 / TAU) * power
             }
+            Shape::Gtr1 => {
+                let alpha2 = self.alpha[0] * self.alpha[0];
+                let scale = T::of((alpha2 - 1.0) / (PI * alpha2.ln()));
+                // 1 + (α² − 1) cos², without the cancellation near the normal.
+                scale / (cos2 * (T::of(alpha2) + tan2_h[0] + tan2_h[1]))
+            }
         }
     }
 
@@ -72,7 +85,7 @@ impl Distribution {
         // The azimuth of an elliptical lobe is that of a circle, stretched. For the Phong shape the stretched
         // quantity is 1/√(e + 1) (Ashikhmin & Shirley 2000, eq. 9).
         let stretch = match self.shape {
-            Shape::Ggx | Shape::Beckmann => [ax, ay],
+            Shape::Ggx | Shape::Beckmann | Shape::Gtr1 => [ax, ay],
             Shape::Phong => self.exponents().map(|e| (e + 2.0).powf(-0.5)),
         };
         let circle = TAU * u[1];
@@ -87,6 +100,11 @@ impl Distribution {
                 let [eu, ev] = self.exponents();
                 let exponent = eu * cos_phi * cos_phi + ev * sin_phi * sin_phi;
                 (-2.0 * (-u[0]).ln_1p() / (exponent + 2.0)).exp_m1()
+            }
+            Shape::Gtr1 => {
+                // Burley (2012), appendix B: cos² = (1 − α^(2 − 2u))/(1 − α²).
+                let power = ax.powf(2.0 * (1.0 - u[0]));
+                (power - ax * ax) / (1.0 - power)
             }
         };
         let cos = (1.0 + tan2).sqrt().recip();

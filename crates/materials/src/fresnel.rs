@@ -32,14 +32,24 @@ impl Fresnel {
     pub fn reflectance<T: Real>(&self, cos: T) -> T {
         match *self {
             Self::None => T::one(),
-            Self::Schlick { f0 } => {
-                let f0 = T::of(f0);
-                f0 + (T::one() - f0) * (T::one() - cos).powi(5)
-            }
+            Self::Schlick { f0 } => mix(T::of(f0), T::one(), schlick_weight(cos)),
             Self::Dielectric { eta } => dielectric(cos, T::of(eta)),
             Self::Conductor { eta, k } => conductor(cos, T::of(eta), T::of(k)),
         }
     }
+}
+
+/// Weight of the reflectance at grazing angles in Schlick's approximation (1994): `(1 − cos)⁵`.
+#[inline(always)]
+pub fn schlick_weight<T: Real>(cos: T) -> T {
+    // A cosine may round to just above 1.
+    (T::one() - cos).max(T::zero()).powi(5)
+}
+
+/// `(1 − t) a + t b`: what lies between two reflectances, or two materials.
+#[inline(always)]
+pub fn mix<T: Real>(a: T, b: T, t: T) -> T {
+    a + (b - a) * t
 }
 
 /// Fresnel's equations for a dielectric interface, unpolarised.

@@ -11,6 +11,7 @@
 //! This crate does no input or output.
 
 pub mod bsdf;
+pub mod burley;
 mod canonical;
 pub mod conformance;
 pub mod distribution;
@@ -25,6 +26,7 @@ pub mod models;
 mod parameter;
 mod real;
 mod sampling;
+pub mod sheen;
 
 pub use bsdf::{Bsdf, Lobe};
 pub use canonical::Canonical;

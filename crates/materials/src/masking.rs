@@ -42,7 +42,8 @@ impl Masking {
     }
 }
 
-/// Smith's auxiliary function Λ, with `G1 = 1/(1 + Λ)` (Heitz 2014, eq. 43). The Phong shape borrows Beckmann's.
+/// Smith's auxiliary function Λ, with `G1 = 1/(1 + Λ)` (Heitz 2014, eq. 43). The Phong shape borrows
+/// Beckmann's, GTR1 that of GGX.
 #[inline(always)]
 pub fn smith_lambda<T: Real>(distribution: &Distribution, w: &[T; 3], rational: bool) -> T {
     let [ax, ay] = distribution.alpha.map(T::of);
@@ -51,7 +52,7 @@ pub fn smith_lambda<T: Real>(distribution: &Distribution, w: &[T; 3], rational: 
         return T::zero();
     }
     match distribution.shape {
-        Shape::Ggx => T::of(0.5) * ((T::one() + projected2 / (w[2] * w[2])).sqrt() - T::one()),
+        Shape::Ggx | Shape::Gtr1 => T::of(0.5) * ((T::one() + projected2 / (w[2] * w[2])).sqrt() - T::one()),
         Shape::Beckmann | Shape::Phong => {
             let a = w[2] / projected2.sqrt();
             if rational { beckmann_lambda_rational(a) } else { beckmann_lambda(a) }

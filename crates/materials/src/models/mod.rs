@@ -7,10 +7,15 @@ use crate::model::Model;
 pub mod ashikhmin_shirley;
 pub mod beckmann;
 pub mod beckmann_conductor;
+pub mod disney;
 pub mod ggx;
 pub mod ggx_conductor;
+pub mod gltf;
+pub mod gltf_spec_gloss;
 pub mod lambert;
+pub mod mitsuba_principled;
 mod shared;
+pub mod usd_preview_surface;
 pub mod ward;
 
 /// The catalogue, in the order in which it is shown.
@@ -22,6 +27,11 @@ static MODELS: &[&Model] = &[
     &ggx_conductor::MODEL,
     &beckmann_conductor::MODEL,
     &ashikhmin_shirley::MODEL,
+    &disney::MODEL,
+    &mitsuba_principled::MODEL,
+    &gltf::MODEL,
+    &gltf_spec_gloss::MODEL,
+    &usd_preview_surface::MODEL,
 ];
 
 /// All models.

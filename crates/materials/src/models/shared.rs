@@ -165,3 +165,131 @@ pub(super) fn conductor(v: &Values) -> [Fresnel; 3] {
     let (eta, k) = (v.colour("eta"), v.colour("k"));
     std::array::from_fn(|c| Fresnel::Conductor { eta: eta[c], k: k[c] })
 }
+
+/// A number from 0 to 1.
+pub(super) const fn unit_number(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: f64,
+    summary: &'static str,
+) -> Parameter {
+    Parameter {
+        name,
+        symbol,
+        role,
+        unit: "1",
+        summary,
+        kind: Kind::Number {
+            range: Range {
+                valid: UNIT,
+                plausible: UNIT,
+                scale: Scale::Linear,
+                search: Levels::new(0.0, 1.0, 0.05),
+                survey: Levels::new(0.05, 1.0, 0.05),
+            },
+            default,
+        },
+    }
+}
+
+/// A colour, each channel from 0 to 1.
+pub(super) const fn unit_colour(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: [f64; 3],
+    summary: &'static str,
+) -> Parameter {
+    Parameter {
+        name,
+        symbol,
+        role,
+        unit: "1",
+        summary,
+        kind: Kind::Colour {
+            range: Range {
+                valid: UNIT,
+                plausible: UNIT,
+                scale: Scale::Linear,
+                search: Levels::new(0.0, 1.0, 0.05),
+                survey: Levels::new(0.1, 1.0, 0.1),
+            },
+            default,
+        },
+    }
+}
+
+/// Colour of the diffuse reflection of a dielectric and of the reflectance of a metal.
+pub(super) const BASE_COLOR: Parameter = unit_colour(
+    ("base_color", "C", Role::BaseColour),
+    [0.5; 3],
+    "Colour of the diffuse reflection and of the metal, linear RGB.",
+);
+
+/// Share of the metal.
+pub(super) const METALLIC: Parameter =
+    unit_number(("metallic", "M", Role::Metalness), 0.0, "0 for a dielectric, 1 for a metal.");
+
+/// Square root of the microfacet α; search and survey reach from α = 0.01 to about 0.7.
+pub(super) const PERCEPTUAL_ROUGHNESS: Parameter = Parameter {
+    name: "roughness",
+    symbol: "R",
+    role: Role::PerceptualRoughness,
+    unit: "1",
+    summary: "Roughness of the specular lobe; its square is the microfacet α.",
+    kind: Kind::Number {
+        range: Range {
+            valid: UNIT,
+            plausible: Interval::closed(0.1, 0.84),
+            scale: Scale::Linear,
+            search: Levels::new(0.10, 0.84, 0.01),
+            survey: Levels::new(0.10, 0.825, 0.025),
+        },
+        default: 0.5,
+    },
+};
+
+/// Index of refraction of a principled model, in levels coarse enough for a search together with roughness.
+pub(super) const fn principled_ior(name: &'static str, symbol: &'static str, valid: Interval) -> Parameter {
+    Parameter {
+        name,
+        symbol,
+        role: Role::RefractiveIndex,
+        unit: "1",
+        summary: "Index of refraction of the dielectric, inside over outside.",
+        kind: Kind::Number {
+            range: Range {
+                valid,
+                plausible: Interval::open_below(1.0, 2.0),
+                scale: Scale::Linear,
+                search: Levels::new(1.02, 2.0, 0.02),
+                survey: Levels::new(1.05, 2.0, 0.05),
+            },
+            default: 1.5,
+        },
+    }
+}
+
+/// The mean of a colour's channels: what a part of a material reflects, roughly, for the shares of a sampling mixture.
+pub(super) fn mean(colour: [f64; 3]) -> f64 {
+    colour.iter().sum::<f64>() / 3.0
+}
+
+/// Anisotropy of Burley's models.
+pub(super) const ANISOTROPIC: Parameter = unit_number(
+    ("anisotropic", "A", Role::Anisotropy),
+    0.0,
+    "How much longer the lobe is along the tangent: the aspect is √(1 − 0.9 anisotropic).",
+);
+
+/// Sheen of Burley's models.
+pub(super) const SHEEN: Parameter = unit_number(
+    ("sheen", "SH", Role::Sheen),
+    0.0,
+    "Reflection at grazing half angles that the diffuse reflection lacks, for cloth.",
+);
+
+pub(super) const SHEEN_TINT_SUMMARY: &str = "How far the sheen takes the base colour's hue.";
+
+/// Clear coat of Burley's models.
+pub(super) const CLEARCOAT: Parameter =
+    unit_number(("clearcoat", "CC", Role::Coat), 0.0, "Second specular lobe, of a quarter of the weight.");
+
+pub(super) const CLEARCOAT_GLOSS_SUMMARY: &str = "Gloss of the clear coat: its α goes from 0.1 to 0.001.";
