@@ -18,6 +18,7 @@ pub mod fresnel;
 pub mod geometry;
 pub mod masking;
 mod material;
+mod metals;
 pub mod microfacet;
 mod model;
 pub mod models;
