@@ -8,7 +8,7 @@
 //! bitangent; `wi` points towards the light and `wo` towards the viewer, both away from the surface.
 //! A BSDF value is in 1/sr, without the cosine.
 //!
-//! This crate does no input or output.
+//! This crate reads the files of measurements that a material names, and nothing else.
 
 pub mod bsdf;
 pub mod conformance;

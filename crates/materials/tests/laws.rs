@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use lookmatch_materials::{Bsdf, Geometry, Kind, Material, Model, Value, registry};
+use lookmatch_materials::{Bsdf, Family, Geometry, Kind, Material, Model, Value, registry};
 use proptest::prelude::*;
 
 fn direction(cos: f64, phi: f64) -> [f64; 3] {
@@ -90,7 +90,9 @@ proptest! {
     #[test]
     fn the_interface_reflects_no_more_than_arrives(m in any_material(), co in 0.03..1.0f64) {
         // Ward's older normalisations and the distribution "as" do not conserve energy; their files say by how much.
+        // Measured materials promise nothing beyond 80°.
         let text = m.to_string();
+        prop_assume!(m.model().family != Family::Measured || co > 0.17);
         prop_assume!(!text.contains("variant=duer") && !text.contains("variant=ward") && m.model().name != "as");
         let albedo = specular_albedo(&*m.bsdf(), co);
         prop_assert!(albedo.iter().all(|a| *a <= 1.0 + 2e-3), "{m} at cos {co}: {albedo:?}");

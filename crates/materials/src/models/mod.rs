@@ -10,6 +10,8 @@ pub mod beckmann_conductor;
 pub mod ggx;
 pub mod ggx_conductor;
 pub mod lambert;
+mod measured;
+pub mod merl;
 mod shared;
 pub mod ward;
 
@@ -22,6 +24,7 @@ static MODELS: &[&Model] = &[
     &ggx_conductor::MODEL,
     &beckmann_conductor::MODEL,
     &ashikhmin_shirley::MODEL,
+    &merl::MODEL,
 ];
 
 /// All models.
