@@ -12,6 +12,7 @@ pub mod ggx_conductor;
 pub mod lambert;
 mod measured;
 pub mod merl;
+pub mod merl_file;
 mod shared;
 pub mod ward;
 
@@ -25,6 +26,7 @@ static MODELS: &[&Model] = &[
     &beckmann_conductor::MODEL,
     &ashikhmin_shirley::MODEL,
     &merl::MODEL,
+    &merl_file::MODEL,
 ];
 
 /// All models.
