@@ -63,7 +63,7 @@ fn evaluation(criterion: &mut Criterion) {
     let mut add = |name: &str, bsdf: &dyn Bsdf| {
         group.bench_function(name, |bencher| bencher.iter_custom(|n| time(bsdf, &geometries, n)));
     };
-    add("floor: bare GGX", &bare_ggx());
+    add("bare GGX lobe", &bare_ggx());
     for model in registry().iter().filter(|m| !needs_a_file(m)) {
         add(model.name, &*Material::new(model).bsdf());
     }

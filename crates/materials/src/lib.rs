@@ -23,6 +23,8 @@ pub mod microfacet;
 mod model;
 pub mod models;
 mod parameter;
+#[cfg(test)]
+mod physically_based;
 mod real;
 mod sampling;
 

@@ -109,7 +109,7 @@ fn measured_values(bytes: &[u8]) -> Result<Vec<[f32; 3]>, String> {
     for k in 0..COUNT {
         let own = value(k);
         measured += usize::from(own.is_some());
-        let before = if k / PHI_D % THETA_D > 0 { PHI_D } else { THETA_D * PHI_D };
+        let before = if (k / PHI_D).is_multiple_of(THETA_D) { THETA_D * PHI_D } else { PHI_D };
         let filled = || k.checked_sub(before).map_or([0.0; 3], |before| values[before]);
         let value = own.unwrap_or_else(filled);
         values.push(value);
