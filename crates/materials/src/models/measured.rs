@@ -70,7 +70,7 @@ pub(super) fn sampling(measured: Measurement, lambert: [f64; 3]) -> Option<Sampl
     let mean = |v: [f64; 3]| (v[0] + v[1] + v[2]) / 3.0;
     let all = albedo(&|g| mean(measured(g)), 0.8);
     // The floor: what is wide is never left to the tails of narrow lobes.
-    let diffuse = (mean(lambert) / all).clamp(0.2, 1.0);
+    let diffuse = (mean(lambert) / all.max(f64::MIN_POSITIVE)).clamp(0.2, 1.0);
     // Measured highlights have a narrow core and wide skirts: one lobe for each.
     let [core, skirt] = tangents(&|g| mean(measured(g)), [0.25, 0.75]).map(|tan| {
         Technique::HalfVector(Distribution { shape: Shape::Ggx, alpha: [tan.clamp(NARROWEST, 1.0); 2] })
