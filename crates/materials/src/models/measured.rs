@@ -79,7 +79,7 @@ pub(super) fn sampling(measured: Measurement, lambert: [f64; 3]) -> Option<Sampl
     Sampling::mixture([(diffuse, Technique::Cosine), (share, core), (share, skirt)])
 }
 
-/// The least α that directions are drawn with: a tenth of MERL's angular resolution.
+/// The least α that directions are drawn with, a ninth of a degree.
 const NARROWEST: f64 = 0.002;
 
 /// The tangents of the angles θ_h within which given shares of a highlight's normals lie, seen from where the light comes from:
