@@ -8,7 +8,7 @@
 //! bitangent; `wi` points towards the light and `wo` towards the viewer, both away from the surface.
 //! A BSDF value is in 1/sr, without the cosine.
 //!
-//! This crate does no input or output.
+//! This crate reads the files of measurements that a material names, and nothing else.
 
 pub mod bsdf;
 pub mod burley;
@@ -20,10 +20,13 @@ pub mod fresnel;
 pub mod geometry;
 pub mod masking;
 mod material;
+mod metals;
 pub mod microfacet;
 mod model;
 pub mod models;
 mod parameter;
+#[cfg(test)]
+mod physically_based;
 mod real;
 mod sampling;
 pub mod sheen;

@@ -18,6 +18,7 @@ pub static MODEL: Model = Model {
     conserves_energy: true,
     parameters: &[SPECULAR_SWITCH, CONDUCTOR_ETA, CONDUCTOR_K, ROUGHNESS_U, ROUGHNESS_V, masking(MASKINGS)],
     aliases: &[ROUGHNESS],
+    named: &[CONDUCTOR],
     surveyed: &["roughness"],
     searched: &["roughness"],
     build: |v| Box::new(metal(Shape::Beckmann, v)),

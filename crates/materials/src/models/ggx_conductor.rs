@@ -26,6 +26,7 @@ pub static MODEL: Model = Model {
         masking(&["separable", "correlated"]),
     ],
     aliases: &[ROUGHNESS],
+    named: &[CONDUCTOR],
     surveyed: &["roughness"],
     searched: &["roughness"],
     build: |v| Box::new(metal(Shape::Ggx, v)),

@@ -13,6 +13,9 @@ pub mod ggx_conductor;
 pub mod gltf;
 pub mod gltf_spec_gloss;
 pub mod lambert;
+mod measured;
+pub mod merl;
+pub mod merl_file;
 pub mod mitsuba_principled;
 mod shared;
 pub mod usd_preview_surface;
@@ -32,6 +35,8 @@ static MODELS: &[&Model] = &[
     &gltf::MODEL,
     &gltf_spec_gloss::MODEL,
     &usd_preview_surface::MODEL,
+    &merl::MODEL,
+    &merl_file::MODEL,
 ];
 
 /// All models.

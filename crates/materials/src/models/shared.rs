@@ -3,7 +3,9 @@
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::Fresnel;
 use crate::masking::Masking;
-use crate::model::{Alias, Values};
+use crate::material::Value;
+use crate::metals;
+use crate::model::{Alias, Named, Values};
 use crate::parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
 
 const UNIT: Interval = Interval::closed(0.0, 1.0);
@@ -131,6 +133,15 @@ pub(super) const CONDUCTOR_K: Parameter = complex_index(
     [5.183, 4.670, 3.910],
     "Extinction coefficient (imaginary part of the index), per channel; the default is iridium.",
 );
+
+/// `conductor` sets the complex index to a metal's.
+pub(super) const CONDUCTOR: Named = Named {
+    name: "conductor",
+    parameters: &["eta", "k"],
+    summary: "Complex index of a metal by its name, from the measurements of refractiveindex.info.",
+    words: metals::names,
+    look_up: |name| metals::by_name(name).map(|m| vec![Value::Colour(m.eta), Value::Colour(m.k)]),
+};
 
 /// A choice of masking functions, the default first.
 pub(super) const fn masking(options: &'static [&'static str]) -> Parameter {
