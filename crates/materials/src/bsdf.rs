@@ -27,6 +27,12 @@ pub trait Bsdf: Send + Sync {
         self.sampling().is_none_or(|s| s.is_isotropic())
     }
 
+    /// True where the mirror image of an isotropic reflection in the plane of the normal and the view reflects alike: of all
+    /// models, not of all measurements.
+    fn is_mirror_symmetric(&self) -> bool {
+        true
+    }
+
     /// The whole BRDF for two unit directions, in 1/sr; 0 where either lies below the surface.
     fn evaluate(&self, wi: [f64; 3], wo: [f64; 3]) -> [f64; 3] {
         let Some(g) = Geometry::new(wi, wo) else {
@@ -48,6 +54,11 @@ pub trait Bsdf: Send + Sync {
 
 /// A lobe written once for both precisions. Implementing it gives a [`Bsdf`].
 pub trait Lobe: Send + Sync {
+    /// See [`Bsdf::is_mirror_symmetric`].
+    fn is_mirror_symmetric(&self) -> bool {
+        true
+    }
+
     /// See [`Bsdf::diffuse`].
     fn diffuse(&self) -> [f64; 3];
     /// See [`Bsdf::specular`].
@@ -71,5 +82,8 @@ impl<L: Lobe> Bsdf for L {
     }
     fn sampling(&self) -> Option<Sampling> {
         Lobe::sampling(self)
+    }
+    fn is_mirror_symmetric(&self) -> bool {
+        Lobe::is_mirror_symmetric(self)
     }
 }

@@ -72,6 +72,12 @@ impl Geometry<f64> {
 }
 
 impl<T: Real> Geometry<T> {
+    /// The mirror image of the reflection in the x-z plane.
+    pub fn mirrored(&self) -> Self {
+        let mirror = |[x, y, z]: [T; 3]| [x, -y, z];
+        Self { wi: mirror(self.wi), wo: mirror(self.wo), ..*self }
+    }
+
     /// The same reflection with both directions turned about the normal by an angle.
     pub fn turned(&self, sin: T, cos: T) -> Self {
         let turn = |w: [T; 3]| [cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]];

@@ -38,9 +38,13 @@ impl LobeTable {
     /// Expands the specular lobe of a BSDF; one that is not isotropic is averaged over all turns about the normal.
     pub(crate) fn new(bsdf: &dyn Bsdf) -> Self {
         let quadrature = &*QUADRATURE;
-        let lobe = match bsdf.is_isotropic() {
-            true => bsdf.specular_all(&quadrature.geometries),
-            false => averaged(bsdf, &quadrature.geometries),
+        let lobe = if !bsdf.is_isotropic() {
+            averaged(bsdf, &quadrature.geometries, (0..TURNS).map(|k| move |g: &Geometry<f32>| turned(g, k)))
+        } else if !bsdf.is_mirror_symmetric() {
+            let both: [fn(&Geometry<f32>) -> Geometry<f32>; 2] = [|g| *g, |g| g.mirrored()];
+            averaged(bsdf, &quadrature.geometries, both.into_iter())
+        } else {
+            bsdf.specular_all(&quadrature.geometries)
         };
         let mut products = vec![[[0.0; 3 * TERMS]; NODES]; ANGLES];
         let mut used = 0;
@@ -103,16 +107,27 @@ fn blend<S: Simd>(simd: S, rows: &[Coefficients], weights: [f32; 4], out: &mut [
 
 const _: () = assert!((3 * ROW).is_multiple_of(16), "rows fill the registers of every instruction set");
 
-/// The mean of an anisotropic lobe over turns about the normal.
-fn averaged(bsdf: &dyn Bsdf, geometries: &[Geometry<f32>]) -> Vec<[f32; 3]> {
-    const TURNS: usize = 8;
+/// Turns about the normal that an anisotropic lobe is averaged over.
+const TURNS: usize = 8;
+
+/// A reflection after one of them.
+fn turned(geometry: &Geometry<f32>, k: usize) -> Geometry<f32> {
+    let (sin, cos) = (PI * (k as f64 + 0.5) / TURNS as f64).sin_cos();
+    geometry.turned(sin as f32, cos as f32)
+}
+
+/// The mean of a lobe over several motions of a reflection.
+fn averaged<M: Fn(&Geometry<f32>) -> Geometry<f32>>(
+    bsdf: &dyn Bsdf,
+    geometries: &[Geometry<f32>],
+    motions: impl ExactSizeIterator<Item = M>,
+) -> Vec<[f32; 3]> {
     let mut mean = vec![[0.0; 3]; geometries.len()];
-    for turn in 0..TURNS {
-        let (sin, cos) = (PI * (turn as f64 + 0.5) / TURNS as f64).sin_cos();
-        let turned: Vec<Geometry<f32>> =
-            geometries.iter().map(|g| g.turned(sin as f32, cos as f32)).collect();
-        for (mean, f) in mean.iter_mut().zip(bsdf.specular_all(&turned)) {
-            (0..3).for_each(|c| mean[c] += f[c] / TURNS as f32);
+    let share = 1.0 / motions.len() as f32;
+    for motion in motions {
+        let moved: Vec<Geometry<f32>> = geometries.iter().map(&motion).collect();
+        for (mean, f) in mean.iter_mut().zip(bsdf.specular_all(&moved)) {
+            (0..3).for_each(|c| mean[c] += f[c] * share);
         }
     }
     mean

@@ -283,6 +283,10 @@ impl Fit {
 }
 
 impl Lobe for &'static Fit {
+    fn is_mirror_symmetric(&self) -> bool {
+        false
+    }
+
     fn diffuse(&self) -> [f64; 3] {
         [0.0; 3]
     }

@@ -145,6 +145,10 @@ fn neighbours<T: Real>(position: T, count: usize) -> (usize, usize, T) {
 }
 
 impl Lobe for Table {
+    fn is_mirror_symmetric(&self) -> bool {
+        false
+    }
+
     fn diffuse(&self) -> [f64; 3] {
         [0.0; 3]
     }

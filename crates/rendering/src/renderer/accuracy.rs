@@ -34,10 +34,15 @@ fn thinned(scene: &Scene, renderer: Renderer, pixels: &[u32]) -> Renderer {
 
 /// Prints and checks the mean ΔE*76 of materials, each with the most that is accepted.
 fn check(scene: &Scene, illumination: Illumination, accepted: &[(&str, f64)]) {
+    check_with(SAMPLES, scene, illumination, accepted);
+}
+
+/// [`check`] with a number of paths for each pixel.
+fn check_with(samples: u32, scene: &Scene, illumination: Illumination, accepted: &[(&str, f64)]) {
     let renderer = Renderer::prepare(scene, illumination, SIZE).unwrap();
     let pixels = some_pixels(&renderer);
     let renderer = thinned(scene, renderer, &pixels);
-    let tracer = PathTracer::prepare(scene, illumination, SIZE, SAMPLES, 1).unwrap();
+    let tracer = PathTracer::prepare(scene, illumination, SIZE, samples, 1).unwrap();
     for (text, most) in accepted {
         let material = Material::parse(text).unwrap();
         let picture = renderer.render(&material, Part::Full);
@@ -62,6 +67,13 @@ fn environment() {
         ("ggx:roughness_u=0.05,roughness_v=0.3", 0.25),
     ];
     check(&Scene::reference(), Illumination::Environment, &accepted);
+}
+
+/// Every model as it is by default: those whose diffuse reflection is not Lambert's, too, which the rings must hold.
+#[test]
+fn every_model() {
+    let names = lookmatch_materials::registry().iter().filter(|m| m.load.is_none()).map(|m| (m.name, 0.35));
+    check_with(4096, &Scene::reference(), Illumination::Environment, &names.collect::<Vec<_>>());
 }
 
 #[test]
