@@ -20,9 +20,14 @@ use crate::product::{self, GROUP, LANES, Lanes, Moments, Reflected};
 use crate::rings::{ROW, Ring, chebyshev, hat_position};
 use crate::rows::{Row, Rows, View};
 
-/// Largest difference of the angles of view in a bundle, in radians; angles are rounded to multiples of it, so that
-/// neighbouring bundles share coefficients.
+/// Largest difference of the angles of view in a bundle, in radians, in a picture of 300 pixels; angles are rounded to
+/// multiples of it, so that neighbouring bundles share coefficients. Pixels of small pictures span more of them, and would
+/// not fill their bundles.
 const ANGLE_STEP: f64 = 1e-3;
+
+fn angle_step(film: &Film) -> f64 {
+    ANGLE_STEP * (300.0 / film.size as f64).max(1.0)
+}
 
 /// Rings sampled between two nodes, inner and outer ones.
 const STRATA: [usize; 2] = [7, 4];
@@ -80,7 +85,9 @@ impl Transport {
             observe((before + rows.len()) as f64 / total as f64);
             bundle
         };
-        let gather = |rows: &[Row]| -> Vec<Bundle> { bundled(rows).into_par_iter().map(bundle).collect() };
+        let gather = |rows: &[Row]| -> Vec<Bundle> {
+            bundled(rows, angle_step(film)).into_par_iter().map(bundle).collect()
+        };
         let place: HashMap<u32, u32> = rows.main.iter().zip(0..).map(|(row, k)| (row.pixel, k)).collect();
         Self {
             main: gather(&rows.main),
@@ -104,11 +111,11 @@ impl Transport {
 }
 
 /// Sorted rows in runs of at most [`LANES`] that are seen under about the same angle.
-fn bundled(rows: &[Row]) -> Vec<&[Row]> {
+fn bundled(rows: &[Row], step: f64) -> Vec<&[Row]> {
     let mut bundles = Vec::new();
     let mut rest = rows;
     while let Some(first) = rest.first() {
-        let near = |row: &&Row| row.theta - first.theta <= ANGLE_STEP;
+        let near = |row: &&Row| row.theta - first.theta <= step;
         let (bundle, after) = rest.split_at(rest.iter().take(LANES).take_while(near).count());
         bundles.push(bundle);
         rest = after;
@@ -174,7 +181,8 @@ impl Bundle {
         }
         reflected.iter_mut().for_each(|reflected| reflected.mark_seen());
         let mean = rows.iter().map(|row| row.theta).sum::<f64>() / rows.len() as f64;
-        Self { theta: (mean / ANGLE_STEP).round() * ANGLE_STEP, len: rows.len(), moments, reflected }
+        let step = angle_step(film);
+        Self { theta: (mean / step).round() * step, len: rows.len(), moments, reflected }
     }
 }
 

@@ -1,8 +1,8 @@
 //! `lookmatch pairs`: every ordered pair of models in one run, as a table and a picture.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::Context;
@@ -10,6 +10,7 @@ use lookmatch_imaging::write_atomically;
 use lookmatch_materials::{Model, by_name, registry};
 use lookmatch_remap::{Options, PairScore, Plan, RemapError, Stage, score_pair};
 use maud::{Markup, PreEscaped, html};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Usage;
@@ -93,22 +94,26 @@ fn search(
     preparation.finish();
     let progress = bar(wanted.len(), "pairs");
     progress.set_position(run.pairs.len() as u64);
+    let missing: Vec<_> =
+        wanted.iter().filter(|(from, to)| !run.pairs.iter().any(|score| is_of(score, from, to))).collect();
     let (started, before) = (Instant::now(), run.seconds);
-    for (from, to) in wanted {
-        if run.pairs.iter().any(|score| is_of(score, from, to)) {
-            continue;
-        }
+    let stop = || stopped.load(Ordering::Relaxed);
+    let run = Mutex::new(run);
+    // One pair keeps few cores busy: its searches follow each other. Neighbouring pairs share the pictures of targets.
+    missing.par_iter().try_for_each(|(from, to)| -> anyhow::Result<()> {
         progress.set_message(format!("{} to {}", from.name, to.name));
-        let score = score_pair(&stage, from, to, &options, &|| stopped.load(Ordering::Relaxed));
+        let score = score_pair(&stage, from, to, &options, &stop);
+        let mut run = run.lock().unwrap_or_else(PoisonError::into_inner);
         if let Err(RemapError::Interrupted { .. }) = score {
             let done = run.pairs.len();
             anyhow::bail!("stopped after {done} of {} pairs; the same command goes on", wanted.len());
         }
         run.pairs.push(score.with_context(|| format!("{} to {}", from.name, to.name))?);
         run.seconds = before + started.elapsed().as_secs_f64();
-        save(&args.output, run)?;
+        save(&args.output, &run)?;
         progress.inc(1);
-    }
+        Ok(())
+    })?;
     progress.finish_and_clear();
     Ok(())
 }
