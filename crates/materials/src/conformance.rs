@@ -7,14 +7,28 @@ use serde_json::{Map, Value as Json};
 use crate::Bsdf;
 use crate::fresnel::Fresnel;
 use crate::microfacet;
-use crate::models::{lambert, ward};
+use crate::models::{
+    ashikhmin_shirley_2000, blinn_phong, cook_torrance, lafortune, lambert, low_abc, low_smooth, oren_nayar,
+    phong, ward,
+};
 
 /// Builds the BSDF of a vector; `None` where a variant or a term is not implemented, or a parameter is missing.
 type Builder = fn(&Parameters) -> Option<Box<dyn Bsdf>>;
 
 /// The models that vectors know.
-const BUILDERS: &[(&str, Builder)] =
-    &[("lambert", lambert::vector), ("ward", ward::vector), ("microfacet", microfacet::vector)];
+const BUILDERS: &[(&str, Builder)] = &[
+    ("lambert", lambert::vector),
+    ("phong", phong::vector),
+    ("blinn_phong", blinn_phong::vector),
+    ("ward", ward::vector),
+    ("microfacet", microfacet::vector),
+    ("ashikhmin_shirley", ashikhmin_shirley_2000::vector),
+    ("cook_torrance_1982", cook_torrance::vector),
+    ("low_microfacet", low_abc::vector),
+    ("low_smooth", low_smooth::vector),
+    ("lafortune", lafortune::vector),
+    ("oren_nayar", oren_nayar::vector),
+];
 
 /// Builds the BSDF of a vector; `None` where the model, a variant or a term is not implemented, or a parameter is missing.
 pub fn bsdf(model: &str, parameters: &Map<String, Json>) -> Option<Box<dyn Bsdf>> {
@@ -44,6 +58,10 @@ impl Parameters<'_> {
             }
             grey => grey.as_f64().map(|v| [v; 3]),
         }
+    }
+
+    pub(crate) fn array(&self, name: &str) -> Option<&[Json]> {
+        self.0.get(name)?.as_array().map(Vec::as_slice)
     }
 
     pub(crate) fn text(&self, name: &str) -> Option<&str> {

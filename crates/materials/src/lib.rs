@@ -22,6 +22,7 @@ pub mod microfacet;
 mod model;
 pub mod models;
 mod parameter;
+mod presets;
 mod real;
 mod sampling;
 

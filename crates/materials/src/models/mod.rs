@@ -5,23 +5,39 @@ use crate::error::nearest;
 use crate::model::Model;
 
 pub mod ashikhmin_shirley;
+pub mod ashikhmin_shirley_2000;
 pub mod beckmann;
 pub mod beckmann_conductor;
+pub mod blinn_phong;
+pub mod cook_torrance;
 pub mod ggx;
 pub mod ggx_conductor;
+pub mod lafortune;
 pub mod lambert;
+pub mod low_abc;
+pub mod low_smooth;
+pub mod oren_nayar;
+pub mod phong;
 mod shared;
 pub mod ward;
 
 /// The catalogue, in the order in which it is shown.
 static MODELS: &[&Model] = &[
     &lambert::MODEL,
+    &oren_nayar::MODEL,
+    &phong::MODEL,
+    &blinn_phong::MODEL,
+    &lafortune::MODEL,
     &ward::MODEL,
     &ggx::MODEL,
     &beckmann::MODEL,
     &ggx_conductor::MODEL,
     &beckmann_conductor::MODEL,
     &ashikhmin_shirley::MODEL,
+    &ashikhmin_shirley_2000::MODEL,
+    &cook_torrance::MODEL,
+    &low_abc::MODEL,
+    &low_smooth::MODEL,
 ];
 
 /// All models.
