@@ -9,7 +9,7 @@ use crate::fresnel::Fresnel;
 use crate::microfacet;
 use crate::models::{
     ashikhmin_shirley_2000, blinn_phong, cook_torrance, lafortune, lambert, low_abc, low_smooth, oren_nayar,
-    phong, ward,
+    phong, rough_plastic, ward,
 };
 
 /// Builds the BSDF of a vector; `None` where a variant or a term is not implemented, or a parameter is missing.
@@ -28,6 +28,7 @@ const BUILDERS: &[(&str, Builder)] = &[
     ("low_smooth", low_smooth::vector),
     ("lafortune", lafortune::vector),
     ("oren_nayar", oren_nayar::vector),
+    ("roughplastic", rough_plastic::vector),
 ];
 
 /// Builds the BSDF of a vector; `None` where the model, a variant or a term is not implemented, or a parameter is missing.
@@ -58,6 +59,11 @@ impl Parameters<'_> {
             }
             grey => grey.as_f64().map(|v| [v; 3]),
         }
+    }
+
+    /// A yes or no, no where it is absent.
+    pub(crate) fn flag(&self, name: &str) -> Option<bool> {
+        self.0.get(name).map_or(Some(false), Json::as_bool)
     }
 
     pub(crate) fn array(&self, name: &str) -> Option<&[Json]> {

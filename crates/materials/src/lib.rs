@@ -24,6 +24,7 @@ pub mod models;
 mod parameter;
 mod presets;
 mod real;
+pub mod rough_interface;
 mod sampling;
 
 pub use bsdf::{Bsdf, Lobe};

@@ -18,6 +18,7 @@ pub mod low_abc;
 pub mod low_smooth;
 pub mod oren_nayar;
 pub mod phong;
+pub mod rough_plastic;
 mod shared;
 pub mod ward;
 
@@ -38,6 +39,7 @@ static MODELS: &[&Model] = &[
     &cook_torrance::MODEL,
     &low_abc::MODEL,
     &low_smooth::MODEL,
+    &rough_plastic::MODEL,
 ];
 
 /// All models.
