@@ -17,7 +17,7 @@
 //! | `variant` | normalisation | exact |
 //!
 //! `exact` is the default because there `specular` is the reflectance at normal incidence itself, for every exponent, and no
-//! light is created at other angles. `rtr` is its simpler approximation: within 0.1 % from n = 1000 on, but up to 7.5 % too
+//! light is created at other angles. `rtr` is its simpler approximation: within 0.2 % from n = 1000 on, but up to 7.5 % too
 //! bright below.
 //!
 //! Presets `ngan-NAME` are Ngan *et al.*'s fits (2005), stated for `k_s (n + 2)/(2π) cosⁿ θ_h`, as `rtr` with their k_s times

@@ -170,7 +170,7 @@ fn check(v: &Values) -> Result<(), String> {
             return Err(format!("{name} has {given} numbers for {count} lobes; give 1 or {count}"));
         }
     }
-    match lobes(v).iter().position(|lobe| !(lobe.scale <= LARGEST)) {
+    match lobes(v).iter().position(|lobe| lobe.scale.is_nan() || lobe.scale > LARGEST) {
         Some(k) => {
             Err(format!("lobe {} reaches values beyond {LARGEST:e}; norm=peak keeps it finite", k + 1))
         }

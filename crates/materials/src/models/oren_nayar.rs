@@ -20,11 +20,11 @@
 //! Both are Lambert's at 0. `qualitative` is the default because renderers mean it by this name; `eon` is the one to prefer
 //! where energy matters: a white surface reflects all light at every roughness.
 //!
-//! Deviations: `full` is not let below 0, which it reaches at opposite grazing angles from σ = 0.65 on. Directional albedos of
+//! Deviations: `full` is not let below 0, which it reaches at opposite grazing angles from σ = 0.67 on. Directional albedos of
 //! `eon` are the exact ones, not their polynomial approximation.
 //!
-//! Known defects: `qualitative` darkens with σ; it has an edge where cos φ changes its sign; `full` exceeds an albedo of 1 at
-//! grazing angles.
+//! Known defects: `qualitative` and `full` darken with σ (at normal incidence to 0.70 and 0.84 of ρ = 1 for σ = 0.7) and exceed an
+//! albedo of 1 at grazing angles, by 1 % and 4 % at most; `qualitative` has an edge where cos φ changes its sign.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
@@ -94,7 +94,7 @@ pub static MODEL: Model = Model {
     build: |v| {
         let variant = variant(v.choice("variant")).unwrap_or(Variant::Qualitative);
         let roughness = v.number(if variant.reads_sigma() { "sigma" } else { "roughness" });
-        Box::new(OrenNayar { colour: v.colour("diffuse"), variant, roughness })
+        Box::new(OrenNayar::new(v.colour("diffuse"), variant, roughness))
     },
     ..Model::BLANK
 };
@@ -132,66 +132,76 @@ fn variant(name: &str) -> Option<Variant> {
 #[derive(Clone, Copy, Debug)]
 pub struct OrenNayar {
     /// Albedo of the facets per channel.
-    pub colour: [f64; 3],
-    /// The form.
-    pub variant: Variant,
-    /// σ in radians or r, as the form has it.
-    pub roughness: f64,
+    colour: [f64; 3],
+    form: Form,
+}
+
+/// A form with what it makes of the roughness.
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    /// A and B.
+    Qualitative { a: f64, b: f64 },
+    /// Factors of C₁, C₂, C₃ and of the second bounce.
+    Full { c1: f64, c2: f64, c3: f64, second: f64 },
+    /// r, `1/(π + (π/2 − 2/3) r)`, and further bounces.
+    Fujii { r: f64, scale: f64, further: Option<Further> },
+}
+
+/// What EON adds to Fujii's form.
+#[derive(Clone, Copy, Debug)]
+struct Further {
+    /// Light of further bounces per channel, over `(1 − E(ω_i))(1 − E(ω_o))`.
+    scale: [f64; 3],
 }
 
 impl OrenNayar {
-    #[inline(always)]
-    fn qualitative<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
-        let s2 = self.roughness * self.roughness;
-        let (a, b) = (1.0 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09));
-        // cos φ sin α tan β = (x_i x_o + y_i y_o)/max(cos θ_i, cos θ_o).
-        let swing = dot_xy(g).max(T::zero()) / g.cos_i().max(g.cos_o());
-        let shape = T::of(a) + T::of(b) * swing;
-        self.colour.map(|c| T::of(c * FRAC_1_PI) * shape)
+    /// A surface of a colour, with σ in radians or r, as the form has it.
+    pub fn new(colour: [f64; 3], variant: Variant, roughness: f64) -> Self {
+        let (r, s2) = (roughness, roughness * roughness);
+        let c1 = 1.0 - 0.5 * s2 / (s2 + 0.33);
+        let form = match variant {
+            Variant::Qualitative => Form::Qualitative { a: c1, b: 0.45 * s2 / (s2 + 0.09) },
+            Variant::Full => Form::Full {
+                c1,
+                c2: 0.45 * s2 / (s2 + 0.09),
+                c3: 0.125 * s2 / (s2 + 0.09) * (4.0 / (PI * PI)).powi(2),
+                second: 0.17 * FRAC_1_PI * s2 / (s2 + 0.13),
+            },
+            Variant::Fujii => Form::Fujii { r, scale: FRAC_1_PI * smooth_albedo(r), further: None },
+            Variant::Eon => {
+                let further = Further::new(colour, r);
+                Form::Fujii { r, scale: FRAC_1_PI * smooth_albedo(r), further }
+            }
+        };
+        Self { colour, form }
     }
 
     #[inline(always)]
-    fn full<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
-        let s2 = self.roughness * self.roughness;
+    fn full<T: Real>(&self, g: &Geometry<T>, [c1, c2, c3]: [f64; 3], second: f64) -> [T; 3] {
         let (one, s) = (T::one(), dot_xy(g));
         let (sin_i, sin_o) = (sine(&g.wi), sine(&g.wo));
         let (angle_i, angle_o) = (sin_i.atan2(g.cos_i()), sin_o.atan2(g.cos_o()));
         let (alpha, beta) = (angle_i.max(angle_o), angle_i.min(angle_o));
-        let sin_alpha = sin_i.max(sin_o);
         let sines = sin_i * sin_o;
         // At the pole there is no azimuth; what it multiplies vanishes there.
         let cos_phi = if sines > T::zero() { (s / sines).max(-one).min(one) } else { T::zero() };
         let turn = T::of(2.0 / PI) * beta;
-        let bent = if s < T::zero() { one - turn.powi(3) / sin_alpha } else { one };
-        let c1 = T::of(1.0 - 0.5 * s2 / (s2 + 0.33));
-        // cos φ sin α tan β = (x_i x_o + y_i y_o)/max(cos θ_i, cos θ_o).
-        let c2 = T::of(0.45 * s2 / (s2 + 0.09)) * bent * s / g.cos_i().max(g.cos_o());
-        let c3 = T::of(0.125 * s2 / (s2 + 0.09) * (4.0 / (PI * PI)).powi(2)) * (alpha * beta).powi(2);
-        let half = (sin_i + sin_o) / (g.cos_i() + g.cos_o());
-        let first = (c1 + c2 + (one - cos_phi.abs()) * c3 * half) * T::of(FRAC_1_PI);
-        let second = (one - cos_phi * turn * turn) * T::of(0.17 * FRAC_1_PI * s2 / (s2 + 0.13));
+        let bent = if s < T::zero() { one - turn.powi(3) / sin_i.max(sin_o) } else { one };
+        let c2 = T::of(c2) * bent * s / g.cos_i().max(g.cos_o());
+        let c3 = T::of(c3) * (alpha * beta).powi(2);
+        let tan_half = (sin_i + sin_o) / (g.cos_i() + g.cos_o());
+        let first = (T::of(c1) + c2 + (one - cos_phi.abs()) * c3 * tan_half) * T::of(FRAC_1_PI);
+        let second = (one - cos_phi * turn * turn) * T::of(second);
         self.colour.map(|c| (T::of(c) * (first + T::of(c) * second)).max(T::zero()))
     }
+}
 
-    /// Fujii's form, and what EON adds to it.
-    #[inline(always)]
-    fn fujii<T: Real>(&self, g: &Geometry<T>, bounces: bool) -> [T; 3] {
-        let r = self.roughness;
-        let scale = FRAC_1_PI / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * r);
-        let s = dot_xy(g);
-        let swing = if s > T::zero() { s / g.cos_i().max(g.cos_o()) } else { s };
-        let single = T::of(scale) * (T::one() + T::of(r) * swing);
+impl Further {
+    /// `None` for a smooth surface, which has no second bounce and no rest to share out.
+    fn new(colour: [f64; 3], r: f64) -> Option<Self> {
         let mean = mean_albedo(r);
-        // A smooth surface has no second bounce, and no rest to share out.
-        let rest = if bounces && mean < 1.0 {
-            (T::one() - albedo(&g.wi, r)) * (T::one() - albedo(&g.wo, r)) * T::of(FRAC_1_PI / (1.0 - mean))
-        } else {
-            T::zero()
-        };
-        self.colour.map(|c| {
-            let further = c * c * mean / (1.0 - c * (1.0 - mean));
-            T::of(c) * single + T::of(further) * rest
-        })
+        let scale = colour.map(|c| c * c * mean / (1.0 - c * (1.0 - mean)) * FRAC_1_PI / (1.0 - mean));
+        (mean < 1.0).then_some(Self { scale })
     }
 }
 
@@ -207,17 +217,22 @@ fn sine<T: Real>(w: &[T; 3]) -> T {
 
 /// Directional albedo of Fujii's form with white facets.
 #[inline(always)]
-fn albedo<T: Real>(w: &[T; 3], r: f64) -> T {
+fn albedo<T: Real>(w: &[T; 3], r: f64, smooth: f64) -> T {
     let (sin, cos, one) = (sine(w), w[2], T::one());
     // (tan θ)(1 − sin³ θ) without the cancellation at grazing angles.
     let rest = sin * cos * (one + sin + sin * sin) / (one + sin);
     let g = sin * (sin.atan2(cos) - sin * cos) + T::of(2.0 / 3.0) * (rest - sin);
-    T::of(1.0 / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * r)) * (one + T::of(r * FRAC_1_PI) * g)
+    T::of(smooth) * (one + T::of(r * FRAC_1_PI) * g)
 }
 
-/// Its mean over all directions, weighted with the cosine.
+/// The same at normal incidence.
+fn smooth_albedo(r: f64) -> f64 {
+    1.0 / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * r)
+}
+
+/// The mean over all directions, weighted with the cosine.
 fn mean_albedo(r: f64) -> f64 {
-    (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * PI)) * r) / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * r)
+    smooth_albedo(r) * (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * PI)) * r)
 }
 
 impl Lobe for OrenNayar {
@@ -227,11 +242,25 @@ impl Lobe for OrenNayar {
 
     #[inline(always)]
     fn specular<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
-        match self.variant {
-            Variant::Qualitative => self.qualitative(g),
-            Variant::Full => self.full(g),
-            Variant::Fujii => self.fujii(g, false),
-            Variant::Eon => self.fujii(g, true),
+        // cos φ sin α tan β = (x_i x_o + y_i y_o)/max(cos θ_i, cos θ_o), here as in the full form.
+        let swing = |s: T| s / g.cos_i().max(g.cos_o());
+        let s = dot_xy(g);
+        match self.form {
+            Form::Qualitative { a, b } => {
+                let shape = T::of(a) + T::of(b) * swing(s.max(T::zero()));
+                self.colour.map(|c| T::of(c * FRAC_1_PI) * shape)
+            }
+            Form::Full { c1, c2, c3, second } => self.full(g, [c1, c2, c3], second),
+            Form::Fujii { r, scale, further } => {
+                let s_over_t = if s > T::zero() { swing(s) } else { s };
+                let single = T::of(scale) * (T::one() + T::of(r) * s_over_t);
+                let lost = |w: &[T; 3]| T::one() - albedo(w, r, scale * PI);
+                let rest = further.map(|f| (f.scale, lost(&g.wi) * lost(&g.wo)));
+                std::array::from_fn(|c| {
+                    let more = rest.map_or(T::zero(), |(scale, rest)| T::of(scale[c]) * rest);
+                    T::of(self.colour[c]) * single + more
+                })
+            }
         }
     }
 
@@ -244,7 +273,7 @@ impl Lobe for OrenNayar {
 pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     let variant = variant(p.text("variant")?)?;
     let roughness = p.number(if variant.reads_sigma() { "sigma" } else { "r" })?;
-    Some(Box::new(OrenNayar { colour: [p.number("kd")?; 3], variant, roughness }))
+    Some(Box::new(OrenNayar::new([p.number("kd")?; 3], variant, roughness)))
 }
 
 #[cfg(test)]
@@ -252,7 +281,7 @@ mod tests {
     use super::*;
 
     fn lobe(variant: Variant, roughness: f64) -> OrenNayar {
-        OrenNayar { colour: [1.0; 3], variant, roughness }
+        OrenNayar::new([1.0; 3], variant, roughness)
     }
 
     #[test]

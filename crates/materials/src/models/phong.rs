@@ -12,8 +12,9 @@
 //! Phong (1975) had neither the normalisation nor reciprocity; this is Lafortune & Willems (1994), *Using the Modified Phong
 //! Reflectance Model for Physically Based Rendering*, and the plugin `phong` of Mitsuba 0.6.
 //!
-//! Known defects: no Fresnel effect; the part of the lobe below the surface is lost, so that the albedo falls from k_s at
-//! normal incidence to about half of it at grazing angles; highlights there are round where real ones are long.
+//! Known defects: no Fresnel effect; the albedo falls from k_s at normal incidence with the cosine of the angle (to 0.11 k_s at
+//! cos θ = 0.1 for n = 100), because the lobe has no factor against it; highlights at grazing angles are round where real ones are
+//! long.
 
 use std::f64::consts::TAU;
 
