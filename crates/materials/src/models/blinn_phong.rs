@@ -7,7 +7,7 @@
 //! | `exact` | `k_s (n + 2)(n + 4)/(8π (2^(−n/2) + n)) cosⁿ θ_h` | Giesen 2009, *Phong and Blinn-Phong normalization factors* |
 //! | `rtr` | `k_s (n + 8)/(8π) cosⁿ θ_h` | Akenine-Möller *et al.* 2008, *Real-Time Rendering*, 3rd ed., 7.6 |
 //! | `ndf` | `k_s D/(4 cos θ_i cos θ_o)` | D as a microfacet distribution, no masking |
-//! | `vgroove` | `k_s D G/(4 cos θ_i cos θ_o)` | the same with Torrance & Sparrow's masking (1967), as Blinn (1977) wrote it |
+//! | `vgroove` | `k_s D G/(4 cos θ_i cos θ_o)` | the same with the masking of Torrance & Sparrow (1967), which Blinn (1977) took |
 //!
 //! | parameter | meaning | default |
 //! |---|---|---|

@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | `phong` | `(n + 2)/(2π)` | a Phong lobe of albedo w at (−1, −1, 1), the default |
 //! | `peak` | `(n + 2)/(2π max(|c_x|, |c_y|, |c_z|)ⁿ)` | fits of Ngan *et al.* (2005) |
-//! | `none` | 1 | the article's eq. 10, where c carries the scale |
+//! | `none` | 1 | the article's own form, where c carries the scale |
 //!
 //! | parameter | meaning | default |
 //! |---|---|---|
@@ -19,7 +19,7 @@
 //! | `norm` | see above | phong |
 //!
 //! `weight`, `cx`, `cy`, `cz` and `exponent` take one number for all lobes or one for each: `cz=1/0.9,exponent=10/300` are two.
-//! Lobes share one colour; three lobes of one colour channel each need three materials.
+//! Lobes share one colour: fits with a direction and an exponent of each channel's own are not representable.
 //!
 //! Presets: `ngan-NAME` (Ngan *et al.* 2005, one lobe, `peak`).
 //!
@@ -44,7 +44,7 @@ pub static MODEL: Model = Model {
     name: "lafortune",
     title: "Lafortune",
     summary: "Any number of generalised cosine lobes: off-specular, retro-reflecting or anisotropic.",
-    reference: "Lafortune et al. 1997, eq. 10",
+    reference: "Lafortune et al. 1997; Ngan et al. 2005 (norm peak)",
     has_fresnel: false,
     parameters: &[
         DIFFUSE,

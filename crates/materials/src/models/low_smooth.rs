@@ -1,4 +1,4 @@
-//! The smooth-surface ABC model of Löw *et al.* (2012), eq. 13: Rayleigh–Rice scattering of a nearly flat surface, beside a
+//! The smooth-surface ABC model of Löw *et al.* (2012), eq. 10-14: Rayleigh–Rice scattering of a nearly flat surface, beside a
 //! Lambert term.
 //!
 //! `f = k_d/π + F S` with `S = A/(1 + B |H_xy|²)^C`, where `H = ω_i + ω_o` is not normalised, and the exact dielectric Fresnel
@@ -29,7 +29,7 @@ pub static MODEL: Model = Model {
     name: "low-smooth",
     title: "Löw ABC (smooth surface)",
     summary: "Scattering of a nearly flat surface with a freely falling tail; has fits of all MERL materials.",
-    reference: "Löw et al. 2012, eq. 13",
+    reference: "Löw et al. 2012, eq. 10-14",
     parameters: &[DIFFUSE, A, B, C, IOR],
     surveyed: &["a", "b"],
     searched: &["a", "b"],

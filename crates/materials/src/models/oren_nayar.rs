@@ -5,8 +5,8 @@
 //!
 //! | variant | f | roughness | source |
 //! |---|---|---|---|
-//! | `qualitative` | `ρ/π (A + B max(0, cos φ) sin α tan β)` | `sigma` | Oren & Nayar 1994, eq. 30 |
-//! | `full` | `ρ/π (C₁ + cos φ C₂ tan β + (1 − |cos φ|) C₃ tan((α + β)/2))`, and a second bounce | `sigma` | the same, eq. 27-29 |
+//! | `qualitative` | `ρ/π (A + B max(0, cos φ) sin α tan β)` | `sigma` | Oren & Nayar 1994, qualitative model |
+//! | `full` | `ρ/π (C₁ + cos φ C₂ tan β + (1 − |cos φ|) C₃ tan((α + β)/2))`, and a second bounce | `sigma` | the same, functional approximation |
 //! | `fujii` | `ρ (1 + r s/t)/(π + (π/2 − 2/3) r)` | `roughness` | Fujii, *A tiny improvement of Oren–Nayar* |
 //! | `eon` | the same with light of all further bounces | `roughness` | Portsmouth *et al.* 2025, *EON* |
 //!
