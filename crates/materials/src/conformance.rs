@@ -7,7 +7,10 @@ use serde_json::{Map, Value as Json};
 use crate::Bsdf;
 use crate::fresnel::Fresnel;
 use crate::microfacet;
-use crate::models::{disney, gltf, lambert, mitsuba_principled, ward};
+use crate::models::{
+    ashikhmin_shirley_2000, blinn_phong, cook_torrance, disney, gltf, lafortune, lambert, low_abc,
+    low_smooth, mitsuba_principled, oren_nayar, phong, rough_plastic, ward,
+};
 
 /// Builds the BSDF of a vector; `None` where a variant or a term is not implemented, or a parameter is missing.
 type Builder = fn(&Parameters) -> Option<Box<dyn Bsdf>>;
@@ -20,6 +23,15 @@ const BUILDERS: &[(&str, Builder)] = &[
     ("disney2012", disney::vector),
     ("principled_mitsuba3", mitsuba_principled::vector),
     ("gltf_pbr", gltf::vector),
+    ("phong", phong::vector),
+    ("blinn_phong", blinn_phong::vector),
+    ("ashikhmin_shirley", ashikhmin_shirley_2000::vector),
+    ("cook_torrance_1982", cook_torrance::vector),
+    ("low_microfacet", low_abc::vector),
+    ("low_smooth", low_smooth::vector),
+    ("lafortune", lafortune::vector),
+    ("oren_nayar", oren_nayar::vector),
+    ("roughplastic", rough_plastic::vector),
 ];
 
 /// Builds the BSDF of a vector; `None` where the model, a variant or a term is not implemented, or a parameter is missing.
@@ -50,6 +62,15 @@ impl Parameters<'_> {
             }
             grey => grey.as_f64().map(|v| [v; 3]),
         }
+    }
+
+    /// A yes or no, no where it is absent.
+    pub(crate) fn flag(&self, name: &str) -> Option<bool> {
+        self.0.get(name).map_or(Some(false), Json::as_bool)
+    }
+
+    pub(crate) fn array(&self, name: &str) -> Option<&[Json]> {
+        self.0.get(name)?.as_array().map(Vec::as_slice)
     }
 
     pub(crate) fn text(&self, name: &str) -> Option<&str> {

@@ -98,6 +98,22 @@ impl<T: Real> Geometry<T> {
     pub fn cos_o(&self) -> T {
         self.wo[2]
     }
+
+    /// `1 − cos θ_h`, with all its digits where the cosine rounds to 1.
+    #[inline(always)]
+    pub fn versine_h(&self) -> T {
+        let tan2 = self.tan2_h[0] + self.tan2_h[1];
+        tan2 * self.cos_h * self.cos_h / (T::one() + self.cos_h)
+    }
+
+    /// `1 − cos` of the angle between the view and the light's mirror image, with all its digits near the mirror direction.
+    #[inline(always)]
+    pub fn versine_mirror(&self) -> T {
+        // Half the squared distance between (−x_i, −y_i, z_i) and the view; |H_xy| = 2 cos_d cos_h tan θ_h.
+        let (across, along) = (self.cos_d * self.cos_h, self.wi[2] - self.wo[2]);
+        let tan2 = self.tan2_h[0] + self.tan2_h[1];
+        T::of(2.0) * across * across * tan2 + T::of(0.5) * along * along
+    }
 }
 
 #[cfg(test)]

@@ -27,7 +27,9 @@ pub mod models;
 mod parameter;
 #[cfg(test)]
 mod physically_based;
+mod presets;
 mod real;
+pub mod rough_interface;
 mod sampling;
 pub mod sheen;
 

@@ -33,13 +33,17 @@ impl Masking {
             Self::Correlated => one / (one + lambda(&g.wi, false) + lambda(&g.wo, false)),
             Self::SeparableRational => one / ((one + lambda(&g.wi, true)) * (one + lambda(&g.wo, true))),
             Self::CorrelatedRational => one / (one + lambda(&g.wi, true) + lambda(&g.wo, true)),
-            Self::VGroove => {
-                let twice = T::of(2.0) * g.cos_h / g.cos_d;
-                one.min(twice * g.cos_i()).min(twice * g.cos_o())
-            }
+            Self::VGroove => v_groove(g),
             Self::One => one,
         }
     }
+}
+
+/// The V-groove of Torrance & Sparrow (1967), which knows no distribution.
+#[inline(always)]
+pub fn v_groove<T: Real>(g: &Geometry<T>) -> T {
+    let twice = T::of(2.0) * g.cos_h / g.cos_d;
+    T::one().min(twice * g.cos_i()).min(twice * g.cos_o())
 }
 
 /// Smith's auxiliary function Λ, with `G1 = 1/(1 + Λ)` (Heitz 2014, eq. 43). The Phong shape borrows

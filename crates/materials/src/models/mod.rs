@@ -5,18 +5,27 @@ use crate::error::nearest;
 use crate::model::Model;
 
 pub mod ashikhmin_shirley;
+pub mod ashikhmin_shirley_2000;
 pub mod beckmann;
 pub mod beckmann_conductor;
+pub mod blinn_phong;
+pub mod cook_torrance;
 pub mod disney;
 pub mod ggx;
 pub mod ggx_conductor;
 pub mod gltf;
 pub mod gltf_spec_gloss;
+pub mod lafortune;
 pub mod lambert;
+pub mod low_abc;
+pub mod low_smooth;
 mod measured;
 pub mod merl;
 pub mod merl_file;
 pub mod mitsuba_principled;
+pub mod oren_nayar;
+pub mod phong;
+pub mod rough_plastic;
 mod shared;
 pub mod usd_preview_surface;
 pub mod ward;
@@ -24,6 +33,10 @@ pub mod ward;
 /// The catalogue, in the order in which it is shown.
 static MODELS: &[&Model] = &[
     &lambert::MODEL,
+    &oren_nayar::MODEL,
+    &phong::MODEL,
+    &blinn_phong::MODEL,
+    &lafortune::MODEL,
     &ward::MODEL,
     &ggx::MODEL,
     &beckmann::MODEL,
@@ -37,6 +50,11 @@ static MODELS: &[&Model] = &[
     &usd_preview_surface::MODEL,
     &merl::MODEL,
     &merl_file::MODEL,
+    &ashikhmin_shirley_2000::MODEL,
+    &cook_torrance::MODEL,
+    &low_abc::MODEL,
+    &low_smooth::MODEL,
+    &rough_plastic::MODEL,
 ];
 
 /// All models.

@@ -57,6 +57,84 @@ pub(super) const ROUGHNESS_V: Parameter =
 /// `roughness` sets both widths.
 pub(super) const ROUGHNESS: Alias = Alias { name: "roughness", parameters: &["roughness_u", "roughness_v"] };
 
+/// Reflectance of a lobe without Fresnel effect.
+pub(super) const SPECULAR: Parameter = Parameter {
+    name: "specular",
+    symbol: "S",
+    role: Role::SpecularReflectance,
+    unit: "1",
+    summary: "Specular reflectance, linear RGB.",
+    kind: Kind::Colour {
+        range: Range {
+            valid: UNIT,
+            plausible: Interval::closed(0.0, 0.4),
+            scale: Scale::Linear,
+            search: Levels::new(0.0, 0.40, 0.01),
+            survey: Levels::new(0.02, 0.40, 0.02),
+        },
+        default: [0.1; 3],
+    },
+};
+
+/// A free scale of a lobe with a Fresnel term, as published fits have it.
+pub(super) const SPECULAR_SCALE: Parameter = Parameter {
+    name: "specular",
+    symbol: "S",
+    role: Role::SpecularReflectance,
+    unit: "1",
+    summary: "Scale of the specular lobe: 0 is diffuse only, 1 is physical; published fits go beyond.",
+    kind: Kind::Colour {
+        range: Range {
+            valid: Interval::closed(0.0, 10.0),
+            plausible: UNIT,
+            scale: Scale::Linear,
+            search: Levels::new(0.0, 1.0, 1.0),
+            survey: Levels::new(1.0, 1.0, 1.0),
+        },
+        default: [1.0; 3],
+    },
+};
+
+/// Reflectance at normal incidence for Schlick's approximation.
+pub(super) const F0: Parameter = Parameter {
+    name: "f0",
+    symbol: "F0",
+    role: Role::NormalReflectance,
+    unit: "1",
+    summary: "Reflectance at normal incidence, linear RGB, for Schlick's Fresnel term.",
+    kind: Kind::Colour {
+        range: Range {
+            valid: UNIT,
+            plausible: UNIT,
+            scale: Scale::Linear,
+            search: Levels::new(0.0, 1.0, 0.02),
+            survey: Levels::new(0.05, 0.95, 0.05),
+        },
+        default: [0.04; 3],
+    },
+};
+
+/// Where the power of a cosine may lie.
+pub(super) const EXPONENTS: Range = Range {
+    valid: Interval::closed(0.0, 1e6),
+    plausible: Interval::closed(1.0, 20_000.0),
+    scale: Scale::Logarithmic,
+    search: Levels::new(1.0, 20_000.0, 1.2),
+    survey: Levels::new(1.0, 20_000.0, 1.4),
+};
+
+/// Narrowness of the lobe, the power of a cosine.
+pub(super) const fn exponent(name: &'static str, symbol: &'static str, summary: &'static str) -> Parameter {
+    Parameter {
+        name,
+        symbol,
+        role: Role::Exponent,
+        unit: "1",
+        summary,
+        kind: Kind::Number { range: EXPONENTS, default: 100.0 },
+    }
+}
+
 /// A scale of the specular lobe that is physically 0 (no lobe) or 1 (the Fresnel reflectance as it is).
 pub(super) const SPECULAR_SWITCH: Parameter = Parameter {
     name: "specular",
@@ -304,3 +382,13 @@ pub(super) const CLEARCOAT: Parameter =
     unit_number(("clearcoat", "CC", Role::Coat), 0.0, "Second specular lobe, of a quarter of the weight.");
 
 pub(super) const CLEARCOAT_GLOSS_SUMMARY: &str = "Gloss of the clear coat: its α goes from 0.1 to 0.001.";
+
+/// The Fresnel term of a model with the choice `fresnel` and a parameter for each.
+pub(super) fn fresnel(v: &Values) -> [Fresnel; 3] {
+    match v.choice("fresnel") {
+        "dielectric" => [Fresnel::Dielectric { eta: v.number("ior") }; 3],
+        "conductor" => conductor(v),
+        "schlick" => v.colour("f0").map(|f0| Fresnel::Schlick { f0 }),
+        _ => [Fresnel::None; 3],
+    }
+}

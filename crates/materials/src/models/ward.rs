@@ -8,6 +8,8 @@
 //! | `duer` | `k_s E / (4π α_u α_v cos θ_i cos θ_o)` | Dür 2006 |
 //! | `ward` | `k_s E / (4π α_u α_v √(cos θ_i cos θ_o))` | Ward 1992, eq. 4 |
 //!
+//! Presets: `ngan-NAME` (variant `ward`) and `ngan-duer-NAME` (variant `duer`), fits of MERL materials by Ngan *et al.* (2005).
+//!
 //! Known defects: no Fresnel effect. `ward` loses and `duer` creates energy towards grazing angles (a directional albedo
 //! of 3.8 k_s at cos θ = 0.02); `gmd` stays below k_s.
 
@@ -16,8 +18,9 @@ use std::f64::consts::PI;
 use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::model::Model;
-use crate::models::shared::{DIFFUSE, ROUGHNESS, ROUGHNESS_U, ROUGHNESS_V, distribution};
-use crate::parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
+use crate::models::shared::*;
+use crate::parameter::{Kind, Parameter, Role};
+use crate::presets;
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling};
 
 /// The description of the model.
@@ -32,23 +35,7 @@ pub static MODEL: Model = Model {
     conserves_energy: true,
     parameters: &[
         DIFFUSE,
-        Parameter {
-            name: "specular",
-            symbol: "S",
-            role: Role::SpecularReflectance,
-            unit: "1",
-            summary: "Specular reflectance, linear RGB.",
-            kind: Kind::Colour {
-                range: Range {
-                    valid: Interval::closed(0.0, 1.0),
-                    plausible: Interval::closed(0.0, 0.4),
-                    scale: Scale::Linear,
-                    search: Levels::new(0.0, 0.40, 0.01),
-                    survey: Levels::new(0.02, 0.40, 0.02),
-                },
-                default: [0.1; 3],
-            },
-        },
+        SPECULAR,
         ROUGHNESS_U,
         ROUGHNESS_V,
         Parameter {
@@ -63,6 +50,7 @@ pub static MODEL: Model = Model {
     aliases: &[ROUGHNESS],
     surveyed: &["specular", "roughness"],
     searched: &["specular", "roughness"],
+    presets: presets::ward,
     build: |v| {
         Box::new(Ward {
             diffuse: v.colour("diffuse"),
