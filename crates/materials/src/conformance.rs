@@ -4,44 +4,23 @@
 
 use serde_json::{Map, Value as Json};
 
-use crate::Bsdf;
 use crate::fresnel::Fresnel;
-use crate::microfacet;
-use crate::models::{
-    ashikhmin_shirley_2000, blinn_phong, cook_torrance, disney, gltf, lafortune, lambert, low_abc,
-    low_smooth, mitsuba_principled, oren_nayar, phong, rough_plastic, ward,
-};
+use crate::{Bsdf, microfacet, registry};
 
 /// Builds the BSDF of a vector; `None` where a variant or a term is not implemented, or a parameter is missing.
-type Builder = fn(&Parameters) -> Option<Box<dyn Bsdf>>;
-
-/// The models that vectors know.
-const BUILDERS: &[(&str, Builder)] = &[
-    ("lambert", lambert::vector),
-    ("ward", ward::vector),
-    ("microfacet", microfacet::vector),
-    ("disney2012", disney::vector),
-    ("principled_mitsuba3", mitsuba_principled::vector),
-    ("gltf_pbr", gltf::vector),
-    ("phong", phong::vector),
-    ("blinn_phong", blinn_phong::vector),
-    ("ashikhmin_shirley", ashikhmin_shirley_2000::vector),
-    ("cook_torrance_1982", cook_torrance::vector),
-    ("low_microfacet", low_abc::vector),
-    ("low_smooth", low_smooth::vector),
-    ("lafortune", lafortune::vector),
-    ("oren_nayar", oren_nayar::vector),
-    ("roughplastic", rough_plastic::vector),
-];
+pub type Builder = fn(&Parameters) -> Option<Box<dyn Bsdf>>;
 
 /// Builds the BSDF of a vector; `None` where the model, a variant or a term is not implemented, or a parameter is missing.
 pub fn bsdf(model: &str, parameters: &Map<String, Json>) -> Option<Box<dyn Bsdf>> {
-    let (_, build) = BUILDERS.iter().find(|(name, _)| *name == model)?;
+    // Vectors of bare microfacet lobes combine terms that no model of the catalogue does.
+    let bare: (&str, Builder) = ("microfacet", microfacet::vector);
+    let mut all = registry().iter().filter_map(|m| m.vectors).chain([bare]);
+    let (_, build) = all.find(|(name, _)| *name == model)?;
     build(&Parameters(parameters))
 }
 
 /// Typed access to a vector's parameters.
-pub(crate) struct Parameters<'a>(&'a Map<String, Json>);
+pub struct Parameters<'a>(&'a Map<String, Json>);
 
 impl Parameters<'_> {
     pub(crate) fn number(&self, name: &str) -> Option<f64> {

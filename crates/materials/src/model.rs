@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use crate::conformance::Builder;
 use crate::error::nearest;
 use crate::material::Value;
 use crate::{Bsdf, MaterialError, Parameter};
@@ -101,6 +102,9 @@ pub struct Model {
     /// Reads a file of measurements, for models with a parameter of that kind; an error says what is wrong.
     #[serde(skip)]
     pub load: Option<fn(&Path) -> Result<Arc<dyn Bsdf>, String>>,
+    /// What conformance vectors call the model, and how its BSDF is built from their parameters.
+    #[serde(skip)]
+    pub vectors: Option<(&'static str, Builder)>,
     /// Builds the BSDF of checked values.
     #[serde(skip)]
     pub build: fn(&Values) -> Box<dyn Bsdf>,
@@ -126,6 +130,7 @@ impl Model {
         diffuse_only: None,
         check: |_| Ok(()),
         load: None,
+        vectors: None,
         build: |_| Box::new(crate::models::lambert::Lambert { diffuse: [0.0; 3] }),
     };
 }

@@ -89,6 +89,7 @@ pub static MODEL: Model = Model {
         let (diffuse, specular) = (v.colour("diffuse"), v.colour("specular"));
         Box::new(AshikhminShirley::new((diffuse, coupling), specular, fresnel(v), exponents))
     },
+    vectors: Some(("ashikhmin_shirley", vector)),
     ..Model::BLANK
 };
 
@@ -188,7 +189,7 @@ impl Lobe for AshikhminShirley {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     let under = ([p.number_or("kd", 0.0)?; 3], coupling(p.text("diffuse").unwrap_or("lambert"))?);
     let exponents = [p.number("nu")?, p.number("nv")?];
     Some(Box::new(AshikhminShirley::new(under, [p.number_or("ks", 1.0)?; 3], [p.fresnel()?; 3], exponents)))

@@ -64,6 +64,7 @@ pub static MODEL: Model = Model {
         let variant = variant(v.choice("variant")).unwrap_or(Variant::Exact);
         Box::new(BlinnPhong::new(v.colour("diffuse"), v.colour("specular"), v.number("exponent"), variant))
     },
+    vectors: Some(("blinn_phong", vector)),
     ..Model::BLANK
 };
 
@@ -141,7 +142,7 @@ impl Lobe for BlinnPhong {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     let diffuse = [p.number_or("kd", 0.0)?; 3];
     Some(Box::new(BlinnPhong::new(
         diffuse,

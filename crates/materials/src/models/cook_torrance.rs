@@ -87,6 +87,7 @@ pub static MODEL: Model = Model {
             fresnel: fresnel(v),
         })
     },
+    vectors: Some(("cook_torrance_1982", vector)),
     ..Model::BLANK
 };
 
@@ -109,7 +110,7 @@ fn beckmann(m: f64) -> Distribution {
 }
 
 /// The BSDF of a conformance vector: the variant `1982`.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(Microfacet {
         diffuse: [p.number_or("kd", 0.0)?; 3],
         specular: [4.0 * p.number_or("ks", 1.0)?; 3],

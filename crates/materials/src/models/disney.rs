@@ -88,6 +88,7 @@ pub static MODEL: Model = Model {
         ]
     }),
     build: |v| Box::new(Disney::new(&Inputs::of(v))),
+    vectors: Some(("disney2012", vector)),
     ..Model::BLANK
 };
 
@@ -210,7 +211,7 @@ impl Lobe for Disney {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(Disney::new(&Inputs {
         base_color: p.colour("base_color")?,
         metallic: p.number("metallic")?,

@@ -104,6 +104,7 @@ pub static MODEL: Model = Model {
         _ => Ok(()),
     },
     build: |v| Box::new(Gltf::of(v)),
+    vectors: Some(("gltf_pbr", vector)),
     ..Model::BLANK
 };
 
@@ -276,7 +277,7 @@ pub(super) fn largest(colour: [f64; 3]) -> f64 {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     let masking = match p.text("g") {
         Some("separable") => Masking::Separable,
         Some("correlated") | None => Masking::Correlated,

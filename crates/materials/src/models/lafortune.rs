@@ -108,6 +108,7 @@ pub static MODEL: Model = Model {
     build: |v| {
         Box::new(Lafortune { diffuse: v.colour("diffuse"), specular: v.colour("specular"), lobes: lobes(v) })
     },
+    vectors: Some(("lafortune", vector)),
     ..Model::BLANK
 };
 
@@ -271,7 +272,7 @@ impl Lobe for Lafortune {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     let norm = norm(p.text("norm").unwrap_or("none"))?;
     let lobe = |json: &Json| {
         let number = |name: &str| json.get(name)?.as_f64();

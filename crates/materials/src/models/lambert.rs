@@ -22,6 +22,7 @@ pub static MODEL: Model = Model {
     surveyed: &["diffuse"],
     searched: &["diffuse"],
     build: |v| Box::new(Lambert { diffuse: v.colour("diffuse") }),
+    vectors: Some(("lambert", vector)),
     ..Model::BLANK
 };
 
@@ -45,6 +46,6 @@ impl Lobe for Lambert {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(Lambert { diffuse: [p.number("kd")?; 3] }))
 }

@@ -64,6 +64,7 @@ pub static MODEL: Model = Model {
             fresnel: Fresnel::Dielectric { eta: v.number("ior") },
         })
     },
+    vectors: Some(("low_microfacet", vector)),
     ..Model::BLANK
 };
 
@@ -188,7 +189,7 @@ pub(super) fn rings(core: f64, tail: f64) -> Option<Sampling> {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     let divisor = match p.text("norm").unwrap_or("pi") {
         "pi" => PI,
         "none" => 1.0,

@@ -43,6 +43,7 @@ pub static MODEL: Model = Model {
             fresnel: Fresnel::Dielectric { eta: v.number("ior") },
         })
     },
+    vectors: Some(("low_smooth", vector)),
     ..Model::BLANK
 };
 
@@ -84,7 +85,7 @@ impl Lobe for LowSmooth {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(LowSmooth {
         diffuse: [p.number_or("kd", 0.0)?; 3],
         height: [p.number("A")?; 3],

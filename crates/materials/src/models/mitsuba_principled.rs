@@ -76,6 +76,7 @@ pub static MODEL: Model = Model {
         ]
     }),
     build: |v| Box::new(Principled::new(&Inputs::of(v))),
+    vectors: Some(("principled_mitsuba3", vector)),
     ..Model::BLANK
 };
 
@@ -200,7 +201,7 @@ impl Lobe for Principled {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(Principled::new(&Inputs {
         base_color: p.colour("base_color")?,
         roughness: p.number("roughness")?,

@@ -1,61 +1,45 @@
-//! The catalogue. A model is one file of this folder and one line of the table below.
+//! The catalogue. A model is one file of this folder and one line of the list below.
 
 use crate::MaterialError;
 use crate::error::nearest;
 use crate::model::Model;
 
-pub mod ashikhmin_shirley;
-pub mod ashikhmin_shirley_2000;
-pub mod beckmann;
-pub mod beckmann_conductor;
-pub mod blinn_phong;
-pub mod cook_torrance;
-pub mod disney;
-pub mod ggx;
-pub mod ggx_conductor;
-pub mod gltf;
-pub mod gltf_spec_gloss;
-pub mod lafortune;
-pub mod lambert;
-pub mod low_abc;
-pub mod low_smooth;
 mod measured;
-pub mod merl;
-pub mod merl_file;
-pub mod mitsuba_principled;
-pub mod oren_nayar;
-pub mod phong;
-pub mod rough_plastic;
 mod shared;
-pub mod usd_preview_surface;
-pub mod ward;
 
-/// The catalogue, in the order in which it is shown.
-static MODELS: &[&Model] = &[
-    &lambert::MODEL,
-    &oren_nayar::MODEL,
-    &phong::MODEL,
-    &blinn_phong::MODEL,
-    &lafortune::MODEL,
-    &ward::MODEL,
-    &ggx::MODEL,
-    &beckmann::MODEL,
-    &ggx_conductor::MODEL,
-    &beckmann_conductor::MODEL,
-    &ashikhmin_shirley::MODEL,
-    &disney::MODEL,
-    &mitsuba_principled::MODEL,
-    &gltf::MODEL,
-    &gltf_spec_gloss::MODEL,
-    &usd_preview_surface::MODEL,
-    &merl::MODEL,
-    &merl_file::MODEL,
-    &ashikhmin_shirley_2000::MODEL,
-    &cook_torrance::MODEL,
-    &low_abc::MODEL,
-    &low_smooth::MODEL,
-    &rough_plastic::MODEL,
-];
+/// Declares the modules of the models, and the catalogue, in the order in which it is shown.
+macro_rules! catalogue {
+    ($($model:ident,)*) => {
+        $(pub mod $model;)*
+        static MODELS: &[&Model] = &[$(&$model::MODEL,)*];
+    };
+}
+
+catalogue! {
+    lambert,
+    oren_nayar,
+    phong,
+    blinn_phong,
+    lafortune,
+    ward,
+    cook_torrance,
+    ggx,
+    beckmann,
+    ggx_conductor,
+    beckmann_conductor,
+    ashikhmin_shirley,
+    ashikhmin_shirley_2000,
+    low_abc,
+    low_smooth,
+    rough_plastic,
+    disney,
+    mitsuba_principled,
+    gltf,
+    gltf_spec_gloss,
+    usd_preview_surface,
+    merl,
+    merl_file,
+}
 
 /// All models.
 pub fn registry() -> &'static [&'static Model] {

@@ -96,6 +96,7 @@ pub static MODEL: Model = Model {
         let roughness = v.number(if variant.reads_sigma() { "sigma" } else { "roughness" });
         Box::new(OrenNayar::new(v.colour("diffuse"), variant, roughness))
     },
+    vectors: Some(("oren_nayar", vector)),
     ..Model::BLANK
 };
 
@@ -270,7 +271,7 @@ impl Lobe for OrenNayar {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     let variant = variant(p.text("variant")?)?;
     let roughness = p.number(if variant.reads_sigma() { "sigma" } else { "r" })?;
     Some(Box::new(OrenNayar::new([p.number("kd")?; 3], variant, roughness)))

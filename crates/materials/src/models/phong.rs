@@ -47,6 +47,7 @@ pub static MODEL: Model = Model {
             exponent: v.number("exponent"),
         })
     },
+    vectors: Some(("phong", vector)),
     ..Model::BLANK
 };
 
@@ -85,7 +86,7 @@ pub(super) fn power_of_cosine<T: Real>(versine: T, exponent: f64) -> T {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(Phong {
         diffuse: [p.number_or("kd", 0.0)?; 3],
         specular: [p.number("ks")?; 3],

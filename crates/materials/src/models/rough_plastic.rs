@@ -99,6 +99,7 @@ pub static MODEL: Model = Model {
         );
         Box::new(plastic)
     },
+    vectors: Some(("roughplastic", vector)),
     ..Model::BLANK
 };
 
@@ -236,7 +237,7 @@ impl Bsdf for RoughPlastic {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(RoughPlastic::new(
         interface(shape(p.text("dist")?)?, p.number("alpha")?, p.number("eta")?),
         [p.number("kd")?; 3],

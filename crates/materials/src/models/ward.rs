@@ -63,6 +63,7 @@ pub static MODEL: Model = Model {
             },
         })
     },
+    vectors: Some(("ward", vector)),
     ..Model::BLANK
 };
 
@@ -118,7 +119,7 @@ impl Lobe for Ward {
 }
 
 /// The BSDF of a conformance vector.
-pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
+fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     Some(Box::new(Ward {
         diffuse: [p.number_or("kd", 0.0)?; 3],
         specular: [p.number("ks")?; 3],
