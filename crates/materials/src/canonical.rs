@@ -23,8 +23,7 @@ impl Canonical {
     /// The hue of the specular reflection: its reflectance divided by that of the brightest channel.
     pub fn tint(&self) -> [f64; 3] {
         let f0 = self.f0.unwrap_or([1.0; 3]);
-        let brightest = f0.into_iter().fold(0.0, f64::max);
-        if brightest > 0.0 { f0.map(|v| v / brightest) } else { [1.0; 3] }
+        if f0 == [0.0; 3] { [1.0; 3] } else { f0.map(|v| v / brightest(f0)) }
     }
 }
 
@@ -33,7 +32,8 @@ impl Material {
     pub fn canonical(&self) -> Canonical {
         let metalness = self.mean(Role::Metalness).unwrap_or(0.0);
         let index = self.colour(Role::ConductorIndex).zip(self.colour(Role::Extinction));
-        let is_metal = index.is_some_and(|_| self.mean(Role::RefractiveIndex).is_none());
+        let index = index.filter(|_| self.is_conductor()).map(|(eta, k)| [eta, k]);
+        let is_metal = index.is_some();
         let base =
             self.colour(Role::BaseColour).map(|c| c.map(|v| v * self.mean(Role::BaseWeight).unwrap_or(1.0)));
         let body = match (self.colour(Role::DiffuseReflectance), base) {
@@ -43,30 +43,37 @@ impl Material {
             // Measured materials and the like: what their diffuse reflection is, if it is Lambert's.
             (None, None) => self.diffuse_only().bsdf().diffuse(),
         };
-        let f0 = self.dielectric_f0(index.map(|(eta, k)| [eta, k])).map(|dielectric| {
+        let f0 = self.dielectric_f0(index).map(|dielectric| {
             std::array::from_fn(|c| {
                 let metal = base.map_or(dielectric[c], |base| base[c]);
                 dielectric[c] + metalness * (metal - dielectric[c])
             })
         });
-        let index = index.map(|(eta, k)| [eta, k]);
         Canonical { body, f0, index, alpha: self.alpha(), metalness: if is_metal { 1.0 } else { metalness } }
+    }
+
+    /// True where the complex index is the one that counts: where the model has no choice, or it fell on the conductor.
+    pub fn is_conductor(&self) -> bool {
+        let choices = self.model().parameters.iter().zip(self.values()).filter(|(p, _)| p.name == "fresnel");
+        self.by_role(Role::ConductorIndex).is_some()
+            && choices.into_iter().all(|(_, choice)| *choice == Value::Choice("conductor"))
     }
 
     /// Reflectance at normal incidence of all but the metal of a base colour.
     fn dielectric_f0(&self, index: Option<[[f64; 3]; 2]>) -> Option<[f64; 3]> {
         let scale = self.colour(Role::SpecularReflectance);
-        let tint = self.colour(Role::SpecularColour).unwrap_or([1.0; 3]);
+        let hue = self.colour(Role::LobeHeight).map(|height| height.map(|v| v / brightest(height)));
+        let tint = self.colour(Role::SpecularColour).or(hue).unwrap_or([1.0; 3]);
         let scaled = |f0: [f64; 3]| {
             let scale = scale.unwrap_or([1.0; 3]);
             Some(std::array::from_fn(|c| scale[c] * tint[c] * f0[c]))
         };
-        if let Some(f0) = self.colour(Role::NormalReflectance) {
-            return scaled(f0);
-        }
         if let Some([eta, k]) = index {
             let at_normal = |c: usize| Fresnel::Conductor { eta: eta[c], k: k[c] }.reflectance(1.0);
             return scaled(std::array::from_fn(at_normal));
+        }
+        if let Some(f0) = self.colour(Role::NormalReflectance) {
+            return scaled(f0);
         }
         if let Some(level) = self.mean(Role::SpecularLevel) {
             return scaled([0.08 * level; 3]);
@@ -119,7 +126,7 @@ impl Material {
             // No index has F0 = 1 or 0; the closest that a model can hold.
             return self.set_role(Role::RefractiveIndex, [ior_from_f0(mean.clamp(1e-6, 0.96)); 3]);
         }
-        if has(Role::ConductorIndex) {
+        if self.is_conductor() {
             return Ok(());
         }
         self.set_role(Role::SpecularReflectance, f0)
@@ -156,6 +163,12 @@ impl Material {
             other => other.mean().map(|v| [v; 3]),
         }
     }
+}
+
+/// The largest channel; 1 for black, which has no hue.
+fn brightest(colour: [f64; 3]) -> f64 {
+    let largest = colour.into_iter().fold(0.0, f64::max);
+    if largest > 0.0 { largest } else { 1.0 }
 }
 
 fn grey([r, g, b]: [f64; 3]) -> f64 {

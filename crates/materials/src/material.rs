@@ -259,7 +259,7 @@ impl Material {
             return copy;
         }
         for (parameter, value) in self.model.parameters.iter().zip(&mut copy.values) {
-            if parameter.role == Role::SpecularReflectance {
+            if matches!(parameter.role, Role::SpecularReflectance | Role::LobeHeight) {
                 *value = match value {
                     Value::Number(_) => Value::Number(0.0),
                     _ => Value::Colour([0.0; 3]),

@@ -16,6 +16,8 @@ pub enum Role {
     DiffuseRoughness,
     /// Scale of the specular lobe; its reflectance at normal incidence where the model has no Fresnel term.
     SpecularReflectance,
+    /// Height of a lobe that is not normalised: what it reflects depends on its width, too.
+    LobeHeight,
     /// Reflectance at normal incidence, F0, itself.
     NormalReflectance,
     /// Reflectance at normal incidence as a level from 0 to 1: F0 is 0.08 times it.
@@ -74,6 +76,7 @@ impl Role {
             Self::BaseWeight => "base weight",
             Self::DiffuseRoughness => "diffuse roughness",
             Self::SpecularReflectance => "specular reflectance",
+            Self::LobeHeight => "height of the lobe",
             Self::NormalReflectance => "reflectance at normal incidence",
             Self::SpecularLevel => "specular level",
             Self::SpecularColour => "specular tint",
@@ -105,7 +108,11 @@ impl Role {
     pub fn is_reflectance(self) -> bool {
         matches!(
             self,
-            Self::SpecularReflectance | Self::NormalReflectance | Self::SpecularLevel | Self::RefractiveIndex
+            Self::SpecularReflectance
+                | Self::LobeHeight
+                | Self::NormalReflectance
+                | Self::SpecularLevel
+                | Self::RefractiveIndex
         )
     }
 

@@ -40,7 +40,7 @@ impl Baseline {
             target.set_alpha(alpha)?;
         }
         // Both have a complex index, which was carried over: what is left is the scale of the lobe.
-        let shares_index = look.index.is_some() && target.by_role(Role::ConductorIndex).is_some();
+        let shares_index = look.index.is_some() && target.is_conductor();
         let scale = source.by_role(Role::SpecularReflectance).and_then(|v| v.mean());
         match self {
             Self::Copy if shares_index => {

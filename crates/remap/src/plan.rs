@@ -293,7 +293,9 @@ pub(crate) fn carry_over(
                 target.set_role(Role::BaseColour, metal.unwrap_or(look.body))?;
             }
             // A searched reflectance is one number: it takes the hue of the source's.
-            (Role::SpecularReflectance | Role::NormalReflectance, _) if !is_free(index) => {
+            (Role::SpecularReflectance | Role::NormalReflectance | Role::LobeHeight, _)
+                if !is_free(index) =>
+            {
                 let tint = look.tint();
                 if let Value::Colour(scale) = target.values()[index] {
                     target.set_value(index, Value::Colour(std::array::from_fn(|c| scale[c] * tint[c])))?;
@@ -405,7 +407,7 @@ impl Draft {
             self.axes
                 .retain(|axis| given.contains(&axis.name) || !role(axis).is_ok_and(Role::is_reflectance));
         }
-        let is_conductor = self.fixed.by_role(Role::ConductorIndex).is_some() && model.has_fresnel;
+        let is_conductor = self.fixed.is_conductor();
         let scale = model.parameters.iter().find(|p| p.role == Role::SpecularReflectance);
         if let Some(scale) = scale.filter(|_| is_conductor && source.canonical().index.is_none()) {
             let is_set = self.axes.iter().any(|a| a.name == scale.name) || self.held.contains(&scale.name);

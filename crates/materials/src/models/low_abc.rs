@@ -52,7 +52,7 @@ pub static MODEL: Model = Model {
             kind: Kind::Choice { options: &["pi", "none"] },
         },
     ],
-    surveyed: &["a", "b"],
+    surveyed: &["ior", "b"],
     searched: &["a", "b"],
     presets: presets::low_abc,
     build: |v| {
@@ -72,7 +72,7 @@ pub static MODEL: Model = Model {
 pub(super) const A: Parameter = Parameter {
     name: "a",
     symbol: "A",
-    role: Role::SpecularReflectance,
+    role: Role::LobeHeight,
     unit: "1",
     summary: "Height of the lobe, per channel; not normalised.",
     kind: Kind::Colour {
@@ -100,7 +100,8 @@ pub(super) const B: Parameter = Parameter {
             plausible: Interval::closed(5.0, 1e7),
             scale: Scale::Logarithmic,
             search: Levels::new(5.0, 1e6, 1.2),
-            survey: Levels::new(10.0, 1e7, 2.0),
+            // With the default height, these reflect a few parts in a thousand to half of the light.
+            survey: Levels::new(100.0, 1e5, 1.5),
         },
         default: 2000.0,
     },

@@ -31,7 +31,7 @@ pub static MODEL: Model = Model {
     summary: "Scattering of a nearly flat surface with a freely falling tail; has fits of all MERL materials.",
     reference: "Löw et al. 2012, eq. 10-14",
     parameters: &[DIFFUSE, A, B, C, IOR],
-    surveyed: &["a", "b"],
+    surveyed: &["ior", "b"],
     searched: &["a", "b"],
     presets: presets::low_smooth,
     build: |v| {
