@@ -7,14 +7,18 @@ use serde_json::{Map, Value as Json};
 use crate::Bsdf;
 use crate::fresnel::Fresnel;
 use crate::microfacet;
-use crate::models::{lambert, ward};
+use crate::models::{lambert, openpbr, ward};
 
 /// Builds the BSDF of a vector; `None` where a variant or a term is not implemented, or a parameter is missing.
 type Builder = fn(&Parameters) -> Option<Box<dyn Bsdf>>;
 
 /// The models that vectors know.
-const BUILDERS: &[(&str, Builder)] =
-    &[("lambert", lambert::vector), ("ward", ward::vector), ("microfacet", microfacet::vector)];
+const BUILDERS: &[(&str, Builder)] = &[
+    ("lambert", lambert::vector),
+    ("ward", ward::vector),
+    ("microfacet", microfacet::vector),
+    ("openpbr", openpbr::vector),
+];
 
 /// Builds the BSDF of a vector; `None` where the model, a variant or a term is not implemented, or a parameter is missing.
 pub fn bsdf(model: &str, parameters: &Map<String, Json>) -> Option<Box<dyn Bsdf>> {

@@ -10,18 +10,23 @@
 //!
 //! This crate does no input or output.
 
+pub mod albedo;
 pub mod bsdf;
 pub mod conformance;
+mod diffuse;
 pub mod distribution;
 mod error;
 pub mod fresnel;
+mod fuzz;
 pub mod geometry;
+mod layers;
 pub mod masking;
 mod material;
 pub mod microfacet;
 mod model;
 pub mod models;
 mod parameter;
+mod quadrature;
 mod real;
 mod sampling;
 

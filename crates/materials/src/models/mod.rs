@@ -10,6 +10,7 @@ pub mod beckmann_conductor;
 pub mod ggx;
 pub mod ggx_conductor;
 pub mod lambert;
+pub mod openpbr;
 mod shared;
 pub mod ward;
 
@@ -22,6 +23,7 @@ static MODELS: &[&Model] = &[
     &ggx_conductor::MODEL,
     &beckmann_conductor::MODEL,
     &ashikhmin_shirley::MODEL,
+    &openpbr::MODEL,
 ];
 
 /// All models.

@@ -165,3 +165,67 @@ pub(super) fn conductor(v: &Values) -> [Fresnel; 3] {
     let (eta, k) = (v.colour("eta"), v.colour("k"));
     std::array::from_fn(|c| Fresnel::Conductor { eta: eta[c], k: k[c] })
 }
+
+/// A number from 0 to 1.
+pub(super) const fn share(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: f64,
+    summary: &'static str,
+) -> Parameter {
+    let range = Range {
+        valid: UNIT,
+        plausible: UNIT,
+        scale: Scale::Linear,
+        search: Levels::new(0.0, 1.0, 0.05),
+        survey: Levels::new(0.0, 1.0, 0.1),
+    };
+    Parameter { name, symbol, role, unit: "1", summary, kind: Kind::Number { range, default } }
+}
+
+/// A linear RGB colour, 0 to 1 per channel.
+pub(super) const fn tint(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: [f64; 3],
+    summary: &'static str,
+) -> Parameter {
+    let range = Range {
+        valid: UNIT,
+        plausible: UNIT,
+        scale: Scale::Linear,
+        search: Levels::new(0.0, 1.0, 0.05),
+        survey: Levels::new(0.0, 1.0, 0.1),
+    };
+    Parameter { name, symbol, role, unit: "1", summary, kind: Kind::Colour { range, default } }
+}
+
+/// Roughness whose square is the microfacet α, from 0 to 1.
+pub(super) const fn perceptual_roughness(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: f64,
+    summary: &'static str,
+) -> Parameter {
+    let range = Range {
+        valid: UNIT,
+        plausible: Interval::closed(0.1, 0.84),
+        scale: Scale::Linear,
+        search: Levels::new(0.10, 0.84, 0.01),
+        survey: Levels::new(0.10, 0.82, 0.04),
+    };
+    Parameter { name, symbol, role, unit: "1", summary, kind: Kind::Number { range, default } }
+}
+
+/// Index of refraction of a layer, 1 or more.
+pub(super) const fn layer_ior(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: f64,
+    summary: &'static str,
+) -> Parameter {
+    let range = Range {
+        valid: Interval::closed(1.0, 100.0),
+        plausible: Interval::closed(1.0, 2.5),
+        scale: Scale::Linear,
+        search: Levels::new(1.04, 3.48, 0.04),
+        survey: Levels::new(1.1, 2.0, 0.05),
+    };
+    Parameter { name, symbol, role, unit: "1", summary, kind: Kind::Number { range, default } }
+}
