@@ -7,7 +7,7 @@ use serde_json::{Map, Value as Json};
 use crate::Bsdf;
 use crate::fresnel::Fresnel;
 use crate::microfacet;
-use crate::models::{lambert, openpbr, ward};
+use crate::models::{kulla_conty, lambert, openpbr, ward};
 
 /// Builds the BSDF of a vector; `None` where a variant or a term is not implemented, or a parameter is missing.
 type Builder = fn(&Parameters) -> Option<Box<dyn Bsdf>>;
@@ -17,6 +17,7 @@ const BUILDERS: &[(&str, Builder)] = &[
     ("lambert", lambert::vector),
     ("ward", ward::vector),
     ("microfacet", microfacet::vector),
+    ("kulla_conty", kulla_conty::vector),
     ("openpbr", openpbr::vector),
 ];
 

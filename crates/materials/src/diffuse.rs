@@ -24,16 +24,16 @@ pub(crate) struct Eon {
 }
 
 impl Eon {
-    /// A reflection of a colour, 0 to 1 per channel, with a roughness from 0 to 1.
-    pub(crate) fn new(colour: [f64; 3], roughness: f64) -> Self {
+    /// A reflection of a colour, 0 to 1 per channel, with a roughness from 0 to 1, times a weight.
+    pub(crate) fn new(weight: f64, colour: [f64; 3], roughness: f64) -> Self {
         let a = 1.0 / (1.0 + C1 * roughness);
         let lost = a * roughness * (C1 - C2);
         let again = |rho: f64| rho * rho * (1.0 - lost) / (1.0 - rho * lost);
         Self {
             roughness,
-            single: colour.map(|rho| FRAC_1_PI * rho * a),
+            single: colour.map(|rho| weight * FRAC_1_PI * rho * a),
             // 1 − E and 1 − Ē have the factor A r in common.
-            multiple: colour.map(|rho| FRAC_1_PI * again(rho) * a * roughness / (C1 - C2)),
+            multiple: colour.map(|rho| weight * FRAC_1_PI * again(rho) * a * roughness / (C1 - C2)),
         }
     }
 
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_white_surface_reflects_everything() {
         for roughness in [0.0, 0.3, 1.0] {
-            let eon = Eon::new([1.0; 3], roughness);
+            let eon = Eon::new(1.0, [1.0; 3], roughness);
             for mu in [0.05f64, 0.4, 1.0] {
                 let wo = [(1.0 - mu * mu).sqrt(), 0.0, mu];
                 let (rings, turns) = (400, 64);

@@ -52,6 +52,7 @@ impl Gloss {
 pub(crate) struct F82 {
     f0: f64,
     b: f64,
+    least: f64,
 }
 
 impl F82 {
@@ -60,7 +61,12 @@ impl F82 {
 
     pub(crate) fn new(f0: f64, tint: f64) -> Self {
         let schlick = f0 + (1.0 - f0) * (1.0 - Self::COS).powi(5);
-        Self { f0, b: schlick * (1.0 - tint) / (Self::COS * (1.0 - Self::COS).powi(6)) }
+        Self { f0, b: schlick * (1.0 - tint) / (Self::COS * (1.0 - Self::COS).powi(6)), least: 0.0 }
+    }
+
+    /// The bare formula, which falls below 0 near 82° where the tint is black.
+    pub(crate) fn unclamped(self) -> Self {
+        Self { least: f64::NEG_INFINITY, ..self }
     }
 
     #[inline(always)]
@@ -68,8 +74,7 @@ impl F82 {
         let rest = T::one() - cos;
         let fifth = rest * rest * rest * rest * rest;
         let f0 = T::of(self.f0);
-        // A black tint takes a little more than there is, just inside 82°.
-        (f0 + (T::one() - f0) * fifth - T::of(self.b) * cos * fifth * rest).max(T::zero())
+        (f0 + (T::one() - f0) * fifth - T::of(self.b) * cos * fifth * rest).max(T::of(self.least))
     }
 
     /// `2 ∫ F c dc`.

@@ -9,6 +9,7 @@ pub mod beckmann;
 pub mod beckmann_conductor;
 pub mod ggx;
 pub mod ggx_conductor;
+pub mod kulla_conty;
 pub mod lambert;
 pub mod openpbr;
 mod shared;
@@ -23,6 +24,7 @@ static MODELS: &[&Model] = &[
     &ggx_conductor::MODEL,
     &beckmann_conductor::MODEL,
     &ashikhmin_shirley::MODEL,
+    &kulla_conty::MODEL,
     &openpbr::MODEL,
 ];
 

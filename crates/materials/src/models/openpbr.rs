@@ -26,11 +26,14 @@
 //!
 //! `turquin` multiplies the base's lobes by `1 + F0 (1 − E₁)/E₁`, E₁ being the albedo of a perfect reflector (Turquin 2019, eq. 16).
 //!
-//! Deviations: transmission, subsurface, thin film and emission are left out. α is at least 0.001, where the specification lets it be 0; indices are at
-//! least 1. K mixes the interface's reflectance and the average one by the base's roughness as the specification suggests, with the integrated
-//! average reflectance for its fit; E_b is the base's colour. The fuzz is the fit of MaterialX (see `fuzz.rs`). The compensation does not apply to
-//! the coat. Known defects: not reciprocal (every layer takes the light of the view direction from the one below); light that bounces between
-//! microfacets is lost unless compensated. Renderers differ in the layering by 2 to 3 %.
+//! Deviations: transmission, subsurface, thin film and emission are left out. α is at least 0.001, where the specification lets it be 0;
+//! indices are at least 1, and a coat above a denser base reflects like the same pair upside down (as in MaterialX). K = lerp(F(θ_o), 1 − (1 − F̄)/n_c², r_b)
+//! with the integrated average reflectance F̄ and the base's roughness `r_b = lerp(lerp(1, r, F0(η')), r, metalness)`; E_b is the base's colour, of a
+//! metal times ξ. The fuzz is MaterialX's fit (see `fuzz.rs`). F82 is not let below 0. The compensation leaves the coat as it is.
+//! Known defects: not reciprocal (every layer takes the light of the view direction from the one below); light that bounces between microfacets is lost
+//! unless compensated. Renderers differ in the layering by 2 to 3 %.
+//!
+//! Checked against the conformance vectors (no fuzz, no compensation). The fuzz and the compensation have no independent check.
 
 use std::array::from_fn;
 
@@ -212,14 +215,16 @@ impl Openpbr {
         let (weight, metalness) = (number("specular_weight"), number("base_metalness"));
         let ior = number("specular_ior");
         let eta = modulated(lerp(ior, (ior / coat_ior).max(coat_ior / ior), coat_weight), weight);
-        let rho = colour("base_color").map(|c| c * number("base_weight"));
+        let base_weight = number("base_weight");
+        let rho = colour("base_color").map(|c| c * base_weight);
         let specular_color = colour("specular_color");
         let metal = (metalness * weight > 0.0)
             .then(|| (metalness * weight, from_fn(|c| F82::new(rho[c], specular_color[c])), rho));
         let diffuse_roughness = number("base_diffuse_roughness");
         let base = Base {
             distribution,
-            dielectric: (metalness < 1.0).then(|| (1.0 - metalness, Eon::new(rho, diffuse_roughness))),
+            dielectric: (metalness < 1.0)
+                .then(|| (1.0 - metalness, Eon::new(base_weight, colour("base_color"), diffuse_roughness))),
             colour: rho,
             roughness: diffuse_roughness,
             gloss: if metalness < 1.0 { Gloss::new(distribution, eta) } else { None },
@@ -231,8 +236,8 @@ impl Openpbr {
         let coat = (coat_weight > 0.0).then(|| {
             let coat_color = colour("coat_color");
             let average = 1.0 - (1.0 - average_reflectance(coat_ior)) / (coat_ior * coat_ior);
-            // A diffuse body scatters everywhere; a metal as far as it is rough.
-            let scattering = lerp(1.0, roughness, metalness);
+            // A diffuse body scatters everywhere; its interface and a metal, as far as they are rough.
+            let scattering = lerp(lerp(1.0, roughness, f0_from_ior(eta)), roughness, metalness);
             Coat {
                 weight: coat_weight,
                 gloss: Gloss::new(spread(coat_roughness, number("coat_roughness_anisotropy")), coat_ior),
@@ -385,5 +390,8 @@ pub(crate) fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
     }
     let number = |name: &str| p.number(name).unwrap_or(f64::NAN);
     let colour = |name: &str| p.colour(name).unwrap_or([f64::NAN; 3]);
-    Some(Box::new(Openpbr::new(&number, &colour, false)))
+    let mut pbr = Openpbr::new(&number, &colour, false);
+    // The vectors follow F82 to its negative values.
+    pbr.base.metal = pbr.base.metal.map(|(weight, f, f0)| (weight, f.map(F82::unclamped), f0));
+    Some(Box::new(pbr))
 }
