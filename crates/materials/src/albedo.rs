@@ -16,7 +16,7 @@ use crate::Real;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::Fresnel;
 use crate::masking::{Masking, smith_lambda};
-use crate::quadrature::{Gauss, chebyshev_coefficients, chebyshev_points};
+use crate::quadrature::{Gauss, chebyshev_coefficients, chebyshev_points, clenshaw};
 
 /// A GGX lobe without its scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -239,17 +239,6 @@ impl<C: Copy + Into<f64>> Expansion<C> {
     }
 }
 
-/// A sum of Chebyshev polynomials (Clenshaw 1955).
-#[inline(always)]
-fn clenshaw<T: Real, C: Copy + Into<f64>>(coefficients: &[C], u: T) -> T {
-    let two_u = u + u;
-    let (mut b, mut before) = (T::zero(), T::zero());
-    for &c in coefficients[1..].iter().rev() {
-        (b, before) = (T::of(c.into()) + two_u * b - before, b);
-    }
-    T::of(coefficients[0].into()) + u * b - before
-}
-
 /// The albedo of an interface from all directions.
 pub struct Albedo {
     interface: Interface,
@@ -287,7 +276,7 @@ impl Albedo {
     fn exact(&self) -> &(Expansion<f64>, f64) {
         self.exact.get_or_init(|| {
             let around = 7 + 2 * self.interface.aspect().min(12.0) as usize;
-            let grid = Grid { polar: 56, around, fineness: 20.0 };
+            let grid = Grid { polar: 64, around, fineness: 100.0 };
             let expansion = Expansion::new(&self.interface, Rule::exact(&self.interface), grid, |c| c);
             let average = expansion.average();
             (expansion, average)

@@ -7,7 +7,7 @@ use serde_json::{Map, Value as Json};
 use crate::Bsdf;
 use crate::fresnel::Fresnel;
 use crate::microfacet;
-use crate::models::{kulla_conty, lambert, openpbr, ward};
+use crate::models::{kulla_conty, lambert, openpbr, standard_surface, ward};
 
 /// Builds the BSDF of a vector; `None` where a variant or a term is not implemented, or a parameter is missing.
 type Builder = fn(&Parameters) -> Option<Box<dyn Bsdf>>;
@@ -19,6 +19,7 @@ const BUILDERS: &[(&str, Builder)] = &[
     ("microfacet", microfacet::vector),
     ("kulla_conty", kulla_conty::vector),
     ("openpbr", openpbr::vector),
+    ("standard_surface", standard_surface::vector),
 ];
 
 /// Builds the BSDF of a vector; `None` where the model, a variant or a term is not implemented, or a parameter is missing.

@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use crate::Real;
+
 /// Nodes and weights of Gauss–Legendre quadrature on `[0, 1]`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Gauss {
@@ -55,6 +57,17 @@ pub(crate) fn chebyshev_coefficients(values: &[f64]) -> Vec<f64> {
         sum * if k == 0 { 1.0 } else { 2.0 } / n as f64
     };
     (0..n).map(coefficient).collect()
+}
+
+/// A sum of Chebyshev polynomials (Clenshaw 1955).
+#[inline(always)]
+pub(crate) fn clenshaw<T: Real, C: Copy + Into<f64>>(coefficients: &[C], u: T) -> T {
+    let two_u = u + u;
+    let (mut b, mut before) = (T::zero(), T::zero());
+    for &c in coefficients[1..].iter().rev() {
+        (b, before) = (T::of(c.into()) + two_u * b - before, b);
+    }
+    T::of(coefficients[0].into()) + u * b - before
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ pub mod kulla_conty;
 pub mod lambert;
 pub mod openpbr;
 mod shared;
+pub mod standard_surface;
 pub mod ward;
 
 /// The catalogue, in the order in which it is shown.
@@ -26,6 +27,7 @@ static MODELS: &[&Model] = &[
     &ashikhmin_shirley::MODEL,
     &kulla_conty::MODEL,
     &openpbr::MODEL,
+    &standard_surface::MODEL,
 ];
 
 /// All models.
