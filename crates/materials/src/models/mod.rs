@@ -12,6 +12,7 @@ pub mod ggx_conductor;
 pub mod kulla_conty;
 pub mod lambert;
 pub mod openpbr;
+pub mod principled;
 mod shared;
 pub mod standard_surface;
 pub mod ward;
@@ -28,6 +29,7 @@ static MODELS: &[&Model] = &[
     &kulla_conty::MODEL,
     &openpbr::MODEL,
     &standard_surface::MODEL,
+    &principled::MODEL,
 ];
 
 /// All models.
