@@ -57,3 +57,30 @@ impl Fuzz {
         T::of(FRAC_1_PI) * (a / length2).powi(2)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lobe_reflects_as_much_as_its_albedo_says() {
+        for roughness in [0.1, 0.5, 1.0] {
+            let fuzz = Fuzz::new(roughness);
+            for mu in [0.1f64, 0.5, 1.0] {
+                let wo = [(1.0 - mu * mu).sqrt() * 0.6, (1.0 - mu * mu).sqrt() * 0.8, mu];
+                let n = 800;
+                let sum: f64 = (0..n * n)
+                    .map(|k| {
+                        // Thin fibres scatter along the surface: cubes put nodes there.
+                        let t = ((k / n) as f64 + 0.5) / n as f64;
+                        let (cos, phi) = (t.powi(3), TAU * ((k % n) as f64 + 0.5) / n as f64);
+                        let sin = (1.0 - cos * cos).sqrt();
+                        let g = Geometry::new([sin * phi.cos(), sin * phi.sin(), cos], wo);
+                        g.map_or(0.0, |g| fuzz.at(&g)) * cos * 3.0 * t * t * TAU / (n * n) as f64
+                    })
+                    .sum();
+                assert!((sum - 1.0).abs() < 5e-3, "{roughness} at {mu}: {sum}");
+            }
+        }
+    }
+}

@@ -16,7 +16,7 @@ impl Gauss {
         let node = |i: usize| {
             // Newton's method from an asymptotic guess (Abramowitz & Stegun, 22.16.6).
             let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
-            for _ in 0..8 {
+            for _ in 0..4 {
                 let (p, slope) = legendre(n, x);
                 x -= p / slope;
             }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use lookmatch_materials::albedo::{Albedo, Interface};
 use lookmatch_materials::distribution::{Distribution, Shape};
 use lookmatch_materials::fresnel::Fresnel;
-use lookmatch_materials::masking::smith_lambda;
+use lookmatch_materials::masking::{Masking, smith_lambda};
 use lookmatch_materials::{Geometry, conformance};
 use serde_json::Value as Json;
 
@@ -110,5 +111,24 @@ fn distribution_and_masking_vectors_hold() {
         let rational = v["type"].as_str().unwrap().ends_with("rational");
         let g1 = 1.0 / (1.0 + smith_lambda(&distribution, &vec3(&v["v"]), rational));
         assert_close(g1, v["G1"].as_f64().unwrap(), 1e-9, v);
+    }
+}
+
+#[test]
+fn albedo_vectors_hold() {
+    let Some(vectors) = vectors() else { return };
+    for v in vectors["components"]["albedo"].as_array().unwrap() {
+        let masking = if v["g"] == "smith_sep" { Masking::Separable } else { Masking::Correlated };
+        let alpha = [v["alpha"].as_f64().unwrap(); 2];
+        let albedo = Albedo::new(Interface { alpha, masking, fresnel: Fresnel::None });
+        if let Some(average) = v["E_avg"].as_f64() {
+            assert_close(albedo.average(), average, 1e-6, v);
+            assert_close(albedo.average::<f32>().into(), average, 3e-4, v);
+            continue;
+        }
+        let mu = v["mu"].as_f64().unwrap();
+        let w = [(1.0 - mu * mu).sqrt(), 0.0, mu];
+        assert_close(albedo.at(&w), v["E"].as_f64().unwrap(), 1e-6, v);
+        assert_close(albedo.at(&w.map(|v| v as f32)).into(), v["E"].as_f64().unwrap(), 5e-4, v);
     }
 }

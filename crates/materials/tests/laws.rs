@@ -114,6 +114,38 @@ proptest! {
     }
 }
 
+/// The albedo of everything, the Lambert term included, per channel.
+fn albedo(bsdf: &dyn Bsdf, cos_o: f64) -> [f64; 3] {
+    let (diffuse, specular) = (bsdf.diffuse(), specular_albedo(bsdf, cos_o));
+    std::array::from_fn(|c| diffuse[c] + specular[c])
+}
+
+/// What a white surface of layers absorbs is what its formula loses; these lose nothing.
+#[test]
+fn white_layers_reflect_everything() {
+    for text in [
+        "openpbr:base_color=1",
+        "openpbr:base_color=1,specular_ior=2.5,specular_roughness=0.9",
+        "openpbr:base_color=1,specular_roughness=0.5,specular_roughness_anisotropy=0.6",
+        "openpbr:base_color=1,base_diffuse_roughness=1,specular_roughness=0.4,energy_compensation=turquin",
+        "openpbr:base_color=1,coat_weight=0.7,coat_roughness=0.4,specular_roughness=0.4",
+        "openpbr:base_color=1,fuzz_weight=0.6,fuzz_roughness=0.4",
+        "standard-surface:base_color=1,specular=0.8,coat=0.5,coat_roughness=0.5,specular_roughness=0.5",
+        "principled:base_color=1",
+        "principled:base_color=1,distribution=ggx,specular_ior_level=0",
+        "principled:base_color=1,metallic=1,roughness=0.9",
+        "principled:base_color=1,coat_weight=1,coat_roughness=0.4,sheen_weight=0.5,roughness=0.7,diffuse_roughness=1",
+        "kulla-conty:diffuse=0,f0=1,roughness=0.8",
+        "kulla-conty:diffuse=0,f0=1,roughness=0.3,masking=separable",
+    ] {
+        let bsdf = Material::parse(text).unwrap().bsdf();
+        for cos_o in [0.1, 0.4, 0.95] {
+            let found = albedo(&*bsdf, cos_o)[0];
+            assert!((found - 1.0).abs() < 3e-3, "{text} at cos {cos_o}: {found}");
+        }
+    }
+}
+
 /// χ² of drawn directions against the density, on a grid over the whole sphere of directions: what Mitsuba's tests do with
 /// every BSDF. The density's integral over all cells is 1, and cells get as many directions as it foretells.
 #[test]
