@@ -136,8 +136,8 @@ impl Lobe for KullaConty {
         let one = T::one();
         let mean = self.albedo.average::<T>();
         let lost = (one - self.albedo.at(&g.wi)) * (one - self.albedo.at(&g.wo));
-        // A mirror loses nothing, and its Ē rounds to 1.
-        let lost = T::of(FRAC_1_PI) * lost / (one - mean).max(T::of(1e-9));
+        // A mirror loses nothing but rounding errors.
+        let lost = T::of(FRAC_1_PI) * lost / (one - mean).max(T::of(1e-5));
         let single = Lobe::specular(&self.single, g);
         std::array::from_fn(|c| {
             let fresnel = T::of(self.average[c]);

@@ -29,7 +29,8 @@
 //! Written after the sources of Cycles 4.x (svm/closure.h, bsdf_microfacet.h, bsdf_util.h, bsdf_sheen.h, bsdf_oren_nayar.h); `diffuse_roughness` is Blender 4.3's.
 //! Deviations: transmission, subsurface, thin film, emission, alpha, rotation of the tangent and bent normals are left out; E, Ē and s̄ are integrated
 //! where Cycles interpolates tables of 32² and 16³; the sheen is a fit of the article's tables (see `fuzz.rs`); α is at least 0.001, where Cycles takes lobes of
-//! `α_x α_y < 5e-7` for mirrors. Not compared with renderings of Blender. Known defects: not reciprocal; strongly anisotropic lobes gain light,
+//! `α_x α_y < 5e-7` for mirrors. Not compared with renderings
+//! of Blender; white surfaces reflect all light, as its layering means them to. Known defects: not reciprocal; strongly anisotropic lobes gain light,
 //! because g is that of a round lobe.
 
 use std::array::from_fn;
@@ -329,8 +330,7 @@ impl Lobe for Principled {
     }
 
     fn sampling(&self) -> Option<Sampling> {
-        let interface =
-            self.interface.as_ref().map_or(0.0, |i| mean(i.tinted) + f64::from(i.albedo.average::<f32>()));
+        let interface = self.interface.as_ref().map_or(0.0, |i| f64::from(i.albedo.average::<f32>()));
         let metal = self.metal.as_ref().map_or(0.0, |(share, f, _)| share * mean(f.map(|f| f.average())));
         let sheen = self.sheen.as_ref().map_or(0.0, |(share, tint, _)| 0.2 * share * mean(*tint));
         let body = if self.diffuse.is_some() { self.dielectric * mean(self.base_color) } else { 0.0 };
