@@ -79,7 +79,8 @@ fn conductor<T: Real>(cos: T, eta: T, k: T) -> T {
     let perpendicular = (modulus + cos2 - two * a * cos) / (modulus + cos2 + two * a * cos);
     let (u, v) = (cos2 * modulus + sin2 * sin2, two * a * cos * sin2);
     let parallel = perpendicular * (u - v) / (u + v);
-    T::of(0.5) * (perpendicular + parallel)
+    // Where nothing reflects (index 1), rounding may leave either a little below 0.
+    (T::of(0.5) * (perpendicular + parallel)).max(T::zero())
 }
 
 /// Normal-incidence reflectance of a dielectric of relative index `ior` (above 0).

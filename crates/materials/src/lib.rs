@@ -10,14 +10,18 @@
 //!
 //! This crate reads the files of measurements that a material names, and nothing else.
 
+pub mod albedo;
 pub mod bsdf;
 pub mod burley;
 mod canonical;
 pub mod conformance;
+mod diffuse;
 pub mod distribution;
 mod error;
 pub mod fresnel;
+mod fuzz;
 pub mod geometry;
+mod layers;
 pub mod masking;
 mod material;
 mod metals;
@@ -25,9 +29,9 @@ pub mod microfacet;
 mod model;
 pub mod models;
 mod parameter;
-#[cfg(test)]
 mod physically_based;
 mod presets;
+mod quadrature;
 mod real;
 pub mod rough_interface;
 mod sampling;

@@ -76,8 +76,9 @@ pub struct Model {
     pub has_fresnel: bool,
     /// True where light and viewer may be swapped.
     pub is_reciprocal: bool,
-    /// True where no more light leaves than arrives, for every valid set of parameters.
-    pub conserves_energy: bool,
+    /// The largest directional albedo of plausible materials, with formulas as they are by default and cos θ_o ≥ 0.03: 1 where
+    /// no more light leaves than arrives, as it should be. A test holds it against random materials.
+    pub largest_albedo: f64,
     /// Its parameters, in the order in which they are shown.
     pub parameters: &'static [Parameter],
     /// Second names.
@@ -120,7 +121,7 @@ impl Model {
         family: Family::Classic,
         has_fresnel: true,
         is_reciprocal: true,
-        conserves_energy: false,
+        largest_albedo: 1.0,
         parameters: &[],
         aliases: &[],
         named: &[],

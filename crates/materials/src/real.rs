@@ -4,6 +4,8 @@ use num_traits::Float;
 
 /// A floating-point type with what material models need beyond [`Float`].
 pub trait Real: Float + Send + Sync + 'static {
+    /// True for double precision: where a table may not stand for the integral itself.
+    const IS_DOUBLE: bool;
     /// Rounds a double-precision constant to this type.
     fn of(value: f64) -> Self;
     /// The error function.
@@ -11,6 +13,7 @@ pub trait Real: Float + Send + Sync + 'static {
 }
 
 impl Real for f64 {
+    const IS_DOUBLE: bool = true;
     fn of(value: f64) -> Self {
         value
     }
@@ -20,6 +23,7 @@ impl Real for f64 {
 }
 
 impl Real for f32 {
+    const IS_DOUBLE: bool = false;
     fn of(value: f64) -> Self {
         value as f32
     }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use lookmatch_materials::albedo::{Albedo, Interface};
 use lookmatch_materials::distribution::{Distribution, Shape};
 use lookmatch_materials::fresnel::Fresnel;
-use lookmatch_materials::masking::smith_lambda;
+use lookmatch_materials::masking::{Masking, smith_lambda};
 use lookmatch_materials::rough_interface::{Internal, Order, RoughInterface, Transmittance};
 use lookmatch_materials::{Geometry, conformance};
 use serde_json::Value as Json;
@@ -35,11 +36,11 @@ fn channels(json: &Json) -> [f64; 3] {
     json.as_f64().map_or_else(|| vec3(json), |grey| [grey; 3])
 }
 
-/// Models that need integrals hold to this in double precision; closed forms to 1e-9.
+/// Models that need integrals hold to this in double precision, closed forms to 1e-9, but where references are less exact
+/// themselves: the diffuse reflection of `roughplastic` to 4e-5, and one vector of `kulla_conty` (α = 0.998, light at grazing
+/// incidence) to 7.9e-6, as finer quadratures show.
 const INTEGRALS: f64 = 1e-6;
-
-/// Where the reference's own integrals are only good to 4e-5.
-const ROUGH_PLASTIC: f64 = 1e-4;
+const LESS_EXACT: [(&str, f64); 2] = [("roughplastic", 1e-4), ("kulla_conty", 1e-5)];
 
 #[test]
 fn brdf_vectors_hold_in_both_precisions() {
@@ -67,10 +68,10 @@ fn check(v: &Json) -> Result<(), String> {
             || format!("{what}: {found} instead of {}, {:.1e} off: {v}", reference[c], error / largest);
         if error <= tolerance * largest + 1e-12 { Ok(()) } else { Err(message()) }
     };
+    let less_exact = LESS_EXACT.into_iter().find(|(model, _)| v["model"] == *model);
     let tolerance = match v["rtol"].as_f64() {
         Some(1e-9) => 1e-9,
-        Some(2e-3) => ROUGH_PLASTIC,
-        _ => INTEGRALS,
+        _ => less_exact.map_or(INTEGRALS, |(_, tolerance)| tolerance),
     };
     let (exact, fast) = (bsdf.evaluate(wi, wo), bsdf.evaluate_f32(wi, wo));
     for c in 0..3 {
@@ -141,5 +142,24 @@ fn rough_interface_vectors_hold() {
             assert_close(inside(Internal::NotTransmitted), number("Fdr_mitsuba06"), integrated, v);
             assert_close(inside(Internal::Reflected), number("Fdr_mitsuba3"), reflected, v);
         }
+    }
+}
+
+#[test]
+fn albedo_vectors_hold() {
+    let Some(vectors) = vectors() else { return };
+    for v in vectors["components"]["albedo"].as_array().unwrap() {
+        let masking = if v["g"] == "smith_sep" { Masking::Separable } else { Masking::Correlated };
+        let alpha = [v["alpha"].as_f64().unwrap(); 2];
+        let albedo = Albedo::new(Interface { alpha, masking, fresnel: Fresnel::None });
+        if let Some(average) = v["E_avg"].as_f64() {
+            assert_close(albedo.average(), average, 1e-6, v);
+            assert_close(albedo.average::<f32>().into(), average, 3e-4, v);
+            continue;
+        }
+        let mu = v["mu"].as_f64().unwrap();
+        let w = [(1.0 - mu * mu).sqrt(), 0.0, mu];
+        assert_close(albedo.at(&w), v["E"].as_f64().unwrap(), 1e-6, v);
+        assert_close(albedo.at(&w.map(|v| v as f32)).into(), v["E"].as_f64().unwrap(), 5e-4, v);
     }
 }

@@ -116,7 +116,7 @@ fn markdown() -> String {
             model.name,
             model.title,
             if model.is_reciprocal { "yes" } else { "no" },
-            if model.conserves_energy { "yes" } else { "no" },
+            format!("{}", model.largest_albedo),
             codes(model.surveyed, "one material"),
             codes(model.searched, "no target"),
         );
@@ -139,7 +139,11 @@ Written by `lookmatch models --markdown`; a test keeps it current. Ranges are wh
 materials lie. Colours are linear RGB; one number stands for grey. A material is written
 `MODEL[@PRESET][:NAME=VALUE,...]`, for instance `ward:specular=0.1,roughness=0.2`.
 
-| model | | reciprocal | conserves energy | as a source: tabulated over | as a target: searched over |
+*Albedo at most* is the largest directional albedo over plausible parameters, with formulas as they are by default: 1 where no
+more light leaves than arrives. Most others add a specular lobe to an uncoupled diffuse term, and exceed 1 where both are bright;
+each model's own file says more. Tests hold these figures against random materials.
+
+| model | | reciprocal | albedo at most | as a source: tabulated over | as a target: searched over |
 |---|---|---|---|---|---|
 ";
 

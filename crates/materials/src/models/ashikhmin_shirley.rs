@@ -21,7 +21,7 @@ pub static MODEL: Model = Model {
     reference: "Ashikhmin & Shirley 2000 (distribution); Mitsuba 0.6 roughconductor; Guarnera et al. 2018, 5.1",
     has_fresnel: true,
     is_reciprocal: true,
-    conserves_energy: false,
+    largest_albedo: 1.15,
     parameters: &[SPECULAR_SWITCH, CONDUCTOR_ETA, CONDUCTOR_K, ROUGHNESS_U, ROUGHNESS_V, masking(MASKINGS)],
     aliases: &[ROUGHNESS],
     named: &[CONDUCTOR],

@@ -44,7 +44,6 @@ pub static MODEL: Model = Model {
     summary: "Anisotropic Phong-like lobe with Schlick's Fresnel term above a coupled diffuse reflection.",
     reference: "Ashikhmin & Shirley 2000, eq. 4, 5",
     // With its own coupling it does; an uncoupled Lambert term or a scale above 1 goes above.
-    conserves_energy: false,
     parameters: &[
         Parameter { role: Role::BaseColour, summary: "Albedo under the lobe, linear RGB.", ..DIFFUSE },
         Parameter {
@@ -80,6 +79,7 @@ pub static MODEL: Model = Model {
         ),
     ],
     aliases: &[Alias { name: "exponent", parameters: &["exponent_u", "exponent_v"] }],
+    named: &[CONDUCTOR],
     surveyed: &["f0", "exponent"],
     searched: &["f0", "exponent"],
     presets: presets::ashikhmin_shirley,

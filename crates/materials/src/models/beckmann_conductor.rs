@@ -15,7 +15,6 @@ pub static MODEL: Model = Model {
     reference: "Cook & Torrance 1982; Walter et al. 2007, eq. 20, 25-27",
     has_fresnel: true,
     is_reciprocal: true,
-    conserves_energy: true,
     parameters: &[SPECULAR_SWITCH, CONDUCTOR_ETA, CONDUCTOR_K, ROUGHNESS_U, ROUGHNESS_V, masking(MASKINGS)],
     aliases: &[ROUGHNESS],
     named: &[CONDUCTOR],

@@ -43,7 +43,7 @@ pub static MODEL: Model = Model {
     reference: "Blinn 1977; Giesen 2009; Akenine-Möller et al. 2008",
     has_fresnel: false,
     // The default variant does; the others do not.
-    conserves_energy: false,
+    largest_albedo: 1.4,
     parameters: &[
         DIFFUSE,
         SPECULAR,

@@ -44,7 +44,7 @@ pub static MODEL: Model = Model {
     title: "Cook–Torrance",
     summary: "Rough dielectric or metal with Gaussian slopes in V-grooves above a Lambert term.",
     reference: "Cook & Torrance 1982; Torrance & Sparrow 1967",
-    conserves_energy: false,
+    largest_albedo: 2.0,
     parameters: &[
         DIFFUSE,
         SPECULAR_SCALE,
@@ -70,6 +70,7 @@ pub static MODEL: Model = Model {
             kind: Kind::Choice { options: &["modern", "1982", "pi"] },
         },
     ],
+    named: &[CONDUCTOR],
     surveyed: &["ior", "roughness"],
     searched: &["specular", "ior", "roughness"],
     presets: presets::cook_torrance,

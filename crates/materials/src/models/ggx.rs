@@ -30,7 +30,7 @@ pub static MODEL: Model = Model {
     has_fresnel: true,
     is_reciprocal: true,
     // The interface alone does; an uncoupled Lambert term of albedo near 1 goes above.
-    conserves_energy: false,
+    largest_albedo: 2.0,
     parameters: &[
         DIFFUSE,
         SPECULAR_SWITCH,

@@ -16,7 +16,6 @@ pub static MODEL: Model = Model {
     reference: "Walter et al. 2007, eq. 20, 33, 34; Heitz 2014, eq. 85-87",
     has_fresnel: true,
     is_reciprocal: true,
-    conserves_energy: true,
     parameters: &[
         SPECULAR_SWITCH,
         CONDUCTOR_ETA,

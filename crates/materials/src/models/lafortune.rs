@@ -46,6 +46,7 @@ pub static MODEL: Model = Model {
     summary: "Any number of generalised cosine lobes: off-specular, retro-reflecting or anisotropic.",
     reference: "Lafortune et al. 1997; Ngan et al. 2005 (norm peak)",
     has_fresnel: false,
+    largest_albedo: 1.4,
     parameters: &[
         DIFFUSE,
         Parameter {

@@ -17,7 +17,6 @@ pub static MODEL: Model = Model {
     reference: "Lambert 1760, Photometria",
     has_fresnel: false,
     is_reciprocal: true,
-    conserves_energy: true,
     parameters: &[DIFFUSE],
     surveyed: &["diffuse"],
     searched: &["diffuse"],

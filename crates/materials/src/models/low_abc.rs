@@ -37,6 +37,7 @@ pub static MODEL: Model = Model {
     title: "Löw ABC (microfacet)",
     summary: "Microfacets with a freely falling tail above a Lambert term; has fits of all MERL materials.",
     reference: "Löw et al. 2012, eq. 15",
+    largest_albedo: 1e4,
     parameters: &[
         DIFFUSE,
         A,

@@ -30,6 +30,7 @@ pub static MODEL: Model = Model {
     title: "Löw ABC (smooth surface)",
     summary: "Scattering of a nearly flat surface with a freely falling tail; has fits of all MERL materials.",
     reference: "Löw et al. 2012, eq. 10-14",
+    largest_albedo: 1e4,
     parameters: &[DIFFUSE, A, B, C, IOR],
     surveyed: &["ior", "b"],
     searched: &["a", "b"],

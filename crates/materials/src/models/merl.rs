@@ -37,7 +37,7 @@ pub static MODEL: Model = Model {
     family: Family::Measured,
     has_fresnel: true,
     is_reciprocal: false,
-    conserves_energy: false,
+    largest_albedo: 1.05,
     parameters: &[
         Parameter {
             name: "material",

@@ -38,7 +38,6 @@ pub static MODEL: Model = Model {
     family: Family::Measured,
     has_fresnel: true,
     is_reciprocal: true,
-    conserves_energy: false,
     parameters: &[
         Parameter {
             name: "file",

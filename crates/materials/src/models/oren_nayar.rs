@@ -42,7 +42,7 @@ pub static MODEL: Model = Model {
     summary: "Diffuse reflection of rough surfaces: plaster, clay, cloth, the moon.",
     reference: "Oren & Nayar 1994; Fujii; Portsmouth et al. 2025",
     has_fresnel: false,
-    conserves_energy: false,
+    largest_albedo: 1.05,
     parameters: &[
         Parameter { role: Role::BaseColour, summary: "Albedo of the facets, linear RGB.", ..DIFFUSE },
         Parameter {

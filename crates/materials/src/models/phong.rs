@@ -32,7 +32,7 @@ pub static MODEL: Model = Model {
     reference: "Phong 1975; Lafortune & Willems 1994; Mitsuba 0.6 phong",
     has_fresnel: false,
     // The lobe alone does; an uncoupled Lambert term of albedo near 1 goes above.
-    conserves_energy: false,
+    largest_albedo: 1.4,
     parameters: &[
         DIFFUSE,
         SPECULAR,

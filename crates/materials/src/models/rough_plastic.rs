@@ -48,7 +48,6 @@ pub static MODEL: Model = Model {
     summary: "Rough dielectric above a diffuse base, coupled: what the interface reflects does not reach the base.",
     reference: "Mitsuba 0.6 and 3, roughplastic; Walter et al. 2007",
     family: crate::Family::Production,
-    conserves_energy: true,
     parameters: &[
         Parameter {
             name: "diffuse_reflectance",

@@ -392,3 +392,35 @@ pub(super) fn fresnel(v: &Values) -> [Fresnel; 3] {
         _ => [Fresnel::None; 3],
     }
 }
+
+/// Roughness whose square is the microfacet α, from 0 to 1.
+pub(super) const fn perceptual_roughness(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: f64,
+    summary: &'static str,
+) -> Parameter {
+    let range = Range {
+        valid: UNIT,
+        plausible: Interval::closed(0.1, 0.84),
+        scale: Scale::Linear,
+        search: Levels::new(0.10, 0.84, 0.01),
+        survey: Levels::new(0.10, 0.82, 0.04),
+    };
+    Parameter { name, symbol, role, unit: "1", summary, kind: Kind::Number { range, default } }
+}
+
+/// Index of refraction of a layer, 1 or more.
+pub(super) const fn layer_ior(
+    (name, symbol, role): (&'static str, &'static str, Role),
+    default: f64,
+    summary: &'static str,
+) -> Parameter {
+    let range = Range {
+        valid: Interval::closed(1.0, 100.0),
+        plausible: Interval::closed(1.0, 2.5),
+        scale: Scale::Linear,
+        search: Levels::new(1.04, 3.48, 0.04),
+        survey: Levels::new(1.1, 2.0, 0.05),
+    };
+    Parameter { name, symbol, role, unit: "1", summary, kind: Kind::Number { range, default } }
+}
