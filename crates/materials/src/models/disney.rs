@@ -54,7 +54,7 @@ pub static MODEL: Model = Model {
     summary: "Burley's principled BRDF: what artists' materials of films and games descend from.",
     reference: "Burley 2012, Physically Based Shading at Disney; wdas/brdf disney.brdf",
     family: Family::Production,
-    largest_albedo: 1.8,
+    largest_albedo: 2.0,
     parameters: &[
         BASE_COLOR,
         METALLIC,

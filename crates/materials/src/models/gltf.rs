@@ -61,7 +61,7 @@ pub static MODEL: Model = Model {
     reference: "glTF 2.0 Appendix B; KHR_materials_specular, _ior, _clearcoat, _sheen, _anisotropy",
     family: Family::Production,
     is_reciprocal: false,
-    largest_albedo: 1.8,
+    largest_albedo: 2.0,
     parameters: &[
         BASE_COLOR,
         METALLIC,

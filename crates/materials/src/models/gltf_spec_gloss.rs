@@ -43,7 +43,7 @@ pub static MODEL: Model = Model {
     summary: "The archived specular-glossiness material of glTF 2.0 files.",
     reference: "glTF 2.0, KHR_materials_pbrSpecularGlossiness (archived); Appendix B",
     family: Family::Production,
-    largest_albedo: 1.5,
+    largest_albedo: 1.6,
     parameters: &[
         unit_colour(
             ("diffuse", "D", Role::BaseColour),

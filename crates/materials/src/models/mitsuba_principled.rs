@@ -49,7 +49,7 @@ pub static MODEL: Model = Model {
     summary: "Mitsuba 3's principled BSDF without transmission.",
     reference: "Mitsuba 3.9, principled.cpp; Burley 2012; Burley 2015, Extending the Disney BRDF",
     family: Family::Production,
-    largest_albedo: 1.8,
+    largest_albedo: 2.0,
     parameters: &[
         BASE_COLOR,
         PERCEPTUAL_ROUGHNESS,

@@ -56,7 +56,7 @@ pub static MODEL: Model = Model {
     has_fresnel: true,
     is_reciprocal: false,
     // Without sheen it does.
-    largest_albedo: 2.0,
+    largest_albedo: 2.5,
     parameters: &[
         unit_number(("base", "w_b", Role::BaseWeight), 1.0, "Scale of the body's colour."),
         unit_colour(

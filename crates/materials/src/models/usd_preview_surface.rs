@@ -60,7 +60,7 @@ pub static MODEL: Model = Model {
     summary: "The material that USD files are exchanged with, as Storm renders it.",
     reference: "UsdPreviewSurface Specification 2.5; OpenUSD previewSurface.glslfx",
     family: Family::Production,
-    largest_albedo: 2.4,
+    largest_albedo: 2.5,
     parameters: &[
         unit_colour(
             ("diffuse_color", "D", Role::BaseColour),
