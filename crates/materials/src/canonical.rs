@@ -1,7 +1,10 @@
 //! What the parameters of a material say, in terms that all models share: how one model's values are read for another.
 
+use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
+
 use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
-use crate::{Material, MaterialError, Role, Value};
+use crate::{Geometry, Material, MaterialError, Role, Value};
 
 /// The look of a material as its parameters foretell it, without rendering: exact for some models, a rule of thumb for
 /// others. It is where a match starts, and what people copy who have no match.
@@ -9,6 +12,8 @@ use crate::{Material, MaterialError, Role, Value};
 pub struct Canonical {
     /// Albedo of the diffuse reflection, linear RGB.
     pub body: [f64; 3],
+    /// Colour of the body and of the metal, where one parameter decides both.
+    pub base: Option<[f64; 3]>,
     /// Specular reflectance at normal incidence, linear RGB; `None` where the model has no parameter that decides it.
     pub f0: Option<[f64; 3]>,
     /// The complex index of a conductor: η and k per channel.
@@ -22,12 +27,89 @@ pub struct Canonical {
 impl Canonical {
     /// The hue of the specular reflection: its reflectance divided by that of the brightest channel.
     pub fn tint(&self) -> [f64; 3] {
-        let f0 = self.f0.unwrap_or([1.0; 3]);
-        if f0 == [0.0; 3] { [1.0; 3] } else { f0.map(|v| v / brightest(f0)) }
+        hue(self.f0.unwrap_or([1.0; 3]))
     }
 }
 
+/// Cosines and weights of Gauss's rule of six points on [0, 1].
+const GAUSS: [(f64, f64); 6] = [
+    (0.033_765_242_898_424, 0.085_662_246_189_585),
+    (0.169_395_306_766_868, 0.180_380_786_524_069),
+    (0.380_690_406_958_402, 0.233_956_967_286_346),
+    (0.619_309_593_041_599, 0.233_956_967_286_346),
+    (0.830_604_693_233_132, 0.180_380_786_524_069),
+    (0.966_234_757_101_576, 0.085_662_246_189_585),
+];
+/// Azimuths between light and viewer in a half turn.
+const TURNS: usize = 8;
+
+/// Light and viewer all over the hemisphere, with weights `2 cos θ_i cos θ_o dω_i dμ_o`: an integral over them is what is
+/// reflected of uniform light.
+static HEMISPHERE: LazyLock<Vec<(Geometry<f32>, f64)>> = LazyLock::new(|| {
+    let mut pairs = Vec::new();
+    for (cos_i, weight_i) in GAUSS {
+        for (cos_o, weight_o) in GAUSS {
+            for turn in 0..TURNS {
+                let direction = |cos: f64, phi: f64| {
+                    let sin = (1.0 - cos * cos).sqrt();
+                    [sin * phi.cos(), sin * phi.sin(), cos]
+                };
+                let phi = PI * (turn as f64 + 0.5) / TURNS as f64;
+                let weight = 2.0 * cos_i * cos_o * weight_i * weight_o * TAU / TURNS as f64;
+                let geometry = Geometry::new(direction(cos_i, phi), direction(cos_o, 0.0));
+                pairs.extend(geometry.map(|g| (g.to_f32(), weight)));
+            }
+        }
+    }
+    pairs
+});
+
 impl Material {
+    /// The share of uniform light that the diffuse reflection sends back, per channel: what a furnace would show. Good to
+    /// some thousandths.
+    pub fn diffuse_albedo(&self) -> [f64; 3] {
+        let bsdf = self.diffuse_only().bsdf();
+        let mut albedo = bsdf.diffuse();
+        if bsdf.sampling().is_none() {
+            return albedo;
+        }
+        let geometries: Vec<Geometry<f32>> = HEMISPHERE.iter().map(|(g, _)| *g).collect();
+        for (f, (_, weight)) in bsdf.specular_all(&geometries).into_iter().zip(&*HEMISPHERE) {
+            (0..3).for_each(|c| albedo[c] += f64::from(f[c]) * weight);
+        }
+        albedo
+    }
+
+    /// Sets the body's colour to what gives the diffuse reflection an albedo, as far as the model's range goes.
+    ///
+    /// # Errors
+    /// None for the models of the catalogue.
+    pub fn set_diffuse_albedo(&mut self, role: Role, wanted: [f64; 3]) -> Result<(), MaterialError> {
+        let near = |albedo: [f64; 3]| (0..3).all(|c| (wanted[c] - albedo[c]).abs() < 1e-4);
+        self.set_role(role, wanted)?;
+        let (mut colour, mut albedo) = (wanted, self.diffuse_albedo());
+        if near(albedo) {
+            return Ok(());
+        }
+        self.set_role(role, [0.0; 3])?;
+        let (mut last, mut last_albedo) = ([0.0; 3], self.diffuse_albedo());
+        // The albedo is nearly linear in the colour: two steps of the secant rule leave nothing to see.
+        for _ in 0..2 {
+            let better = std::array::from_fn(|c| {
+                let slope = (albedo[c] - last_albedo[c]) / (colour[c] - last[c]);
+                let step = (wanted[c] - albedo[c]) / slope;
+                if step.is_finite() { (colour[c] + step).clamp(0.0, 1.0) } else { colour[c] }
+            });
+            (last, last_albedo, colour) = (colour, albedo, better);
+            self.set_role(role, colour)?;
+            albedo = self.diffuse_albedo();
+            if near(albedo) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// What the parameters say in shared terms.
     pub fn canonical(&self) -> Canonical {
         let metalness = self.mean(Role::Metalness).unwrap_or(0.0);
@@ -49,7 +131,14 @@ impl Material {
                 dielectric[c] + metalness * (metal - dielectric[c])
             })
         });
-        Canonical { body, f0, index, alpha: self.alpha(), metalness: if is_metal { 1.0 } else { metalness } }
+        Canonical {
+            body,
+            base,
+            f0,
+            index,
+            alpha: self.alpha(),
+            metalness: if is_metal { 1.0 } else { metalness },
+        }
     }
 
     /// True where the complex index is the one that counts: where the model has no choice, or it fell on the conductor.
@@ -165,6 +254,11 @@ impl Material {
     }
 }
 
+/// A colour divided by its largest channel; white for black.
+pub fn hue(colour: [f64; 3]) -> [f64; 3] {
+    if colour == [0.0; 3] { [1.0; 3] } else { colour.map(|v| v / brightest(colour)) }
+}
+
 /// The largest channel; 1 for black, which has no hue.
 fn brightest(colour: [f64; 3]) -> f64 {
     let largest = colour.into_iter().fold(0.0, f64::max);
@@ -192,6 +286,23 @@ mod tests {
         assert!(gold.tint()[0] == 1.0 && gold.tint()[2] < 0.5);
         assert_eq!(canonical("ward:specular=0.1/0.2/0.3").f0, Some([0.1, 0.2, 0.3]));
         assert_eq!(canonical("lambert").f0, None);
+    }
+
+    #[test]
+    fn diffuse_albedos_can_be_measured_and_set() {
+        let albedo = |text: &str| Material::parse(text).unwrap().diffuse_albedo()[0];
+        assert_eq!(albedo("ggx:diffuse=0.3"), 0.3);
+        // EON reflects all of a white furnace.
+        assert!((albedo("oren-nayar:variant=eon,diffuse=1,roughness=0.8") - 1.0).abs() < 5e-3);
+        for text in ["rough-plastic:alpha=0.3", "ashikhmin-shirley:f0=0.3", "disney:roughness=0.3", "openpbr"]
+        {
+            let mut material = Material::parse(text).unwrap();
+            let role = [Role::DiffuseReflectance, Role::BaseColour];
+            let role = role.into_iter().find(|role| material.by_role(*role).is_some()).unwrap();
+            material.set_diffuse_albedo(role, [0.1, 0.2, 0.3]).unwrap();
+            let found = material.diffuse_albedo();
+            assert!((0..3).all(|c| (found[c] - 0.1 * (c + 1) as f64).abs() < 1e-3), "{material}: {found:?}");
+        }
     }
 
     #[test]

@@ -38,7 +38,7 @@ mod sampling;
 pub mod sheen;
 
 pub use bsdf::{Bsdf, Lobe};
-pub use canonical::Canonical;
+pub use canonical::{Canonical, hue};
 pub use error::MaterialError;
 pub use geometry::Geometry;
 pub use material::{Material, MeasuredFile, Value};

@@ -99,6 +99,11 @@ impl Role {
         }
     }
 
+    /// True for what decides the colour of the diffuse reflection.
+    pub fn is_body(self) -> bool {
+        matches!(self, Self::DiffuseReflectance | Self::BaseColour)
+    }
+
     /// True for what decides the width of the specular lobe.
     pub fn is_width(self) -> bool {
         self.alpha(0.5).is_some()

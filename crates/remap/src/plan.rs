@@ -2,7 +2,7 @@
 
 use lookmatch_imaging::Fitness;
 use lookmatch_materials::fresnel::ior_from_f0;
-use lookmatch_materials::{Levels, Material, Model, Range, Role, Scale, Value};
+use lookmatch_materials::{Levels, Material, Model, Range, Role, Scale, Value, hue};
 use lookmatch_rendering::Scene;
 use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
@@ -248,7 +248,7 @@ impl Plan {
     /// The target material at the given values of the target axes, beside a source: see [`carry_over`].
     pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
         let mut target = material(&self.to, &self.target_axes, values)?;
-        carry_over(source, &mut target, &self.target_axes)?;
+        carry_over(source, &mut target, &self.target_axes, Body::Matched)?;
         Ok(target)
     }
 }
@@ -262,18 +262,28 @@ pub(crate) fn material(fixed: &Material, axes: &[Axis], values: &[f64]) -> Resul
     Ok(material)
 }
 
+/// How the colour of the body is carried over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Body {
+    /// As it is written.
+    Copied,
+    /// Such that the diffuse reflections have the same albedo.
+    Matched,
+}
+
 /// Sets what the search leaves alone to what the source has of it: a conductor's index, the colour of the body, the hue of
 /// the specular reflection; a metal's colour and metalness where the target has one.
 pub(crate) fn carry_over(
     source: &Material,
     target: &mut Material,
     searched: &[Axis],
+    body: Body,
 ) -> Result<(), RemapError> {
     let taken: Vec<usize> =
         searched.iter().map(|a| target.model().resolve(&a.name)).collect::<Result<Vec<_>, _>>()?.concat();
     let is_free = |index: usize| !taken.contains(&index);
     let look = source.canonical();
-    let becomes_metal = becomes_metal(source, target);
+    let metal = metal(source, target);
     for (index, parameter) in target.model().parameters.iter().enumerate() {
         match (parameter.role, look.index) {
             (Role::ConductorIndex, Some([eta, _])) if is_free(index) => {
@@ -282,35 +292,58 @@ pub(crate) fn carry_over(
             (Role::Extinction, Some([_, k])) if is_free(index) => {
                 target.set_value(index, Value::Colour(k))?
             }
-            (Role::DiffuseReflectance, _) if is_free(index) => {
-                target.set_role(Role::DiffuseReflectance, look.body)?;
+            // A searched colour is one number: it takes the hue of the source's.
+            (Role::DiffuseReflectance | Role::BaseColour, _) if !is_free(index) => {
+                target.set_value(index, tinted(&target.values()[index], hue(look.body)))?;
             }
-            (Role::Metalness, _) if is_free(index) && becomes_metal => {
-                target.set_role(Role::Metalness, [look.metalness; 3])?;
-            }
-            (Role::BaseColour, _) if is_free(index) => {
-                let metal = look.f0.filter(|_| becomes_metal);
-                target.set_role(Role::BaseColour, metal.unwrap_or(look.body))?;
-            }
-            // A searched reflectance is one number: it takes the hue of the source's.
             (Role::SpecularReflectance | Role::NormalReflectance | Role::LobeHeight, _)
                 if !is_free(index) =>
             {
-                let tint = look.tint();
-                if let Value::Colour(scale) = target.values()[index] {
-                    target.set_value(index, Value::Colour(std::array::from_fn(|c| scale[c] * tint[c])))?;
-                }
+                target.set_value(index, tinted(&target.values()[index], look.tint()))?;
             }
             _ => {}
         }
     }
-    Ok(())
+    let of_role = |wanted: fn(Role) -> bool| target.model().parameters.iter().position(|p| wanted(p.role));
+    let is_metalness_free = of_role(|role| role == Role::Metalness).is_some_and(is_free);
+    match of_role(Role::is_body).filter(|index| is_free(*index)) {
+        Some(index) => match metal.filter(|_| is_metalness_free) {
+            Some((metalness, colour)) => {
+                target.set_role(Role::Metalness, [metalness; 3])?;
+                Ok(target.set_role(Role::BaseColour, colour)?)
+            }
+            None => colour_body(source, target, target.model().parameters[index].role, body),
+        },
+        None => Ok(()),
+    }
 }
 
-/// True where a metal is to be made of a target that can be one and is not yet.
-fn becomes_metal(source: &Material, target: &Material) -> bool {
+/// Gives the target the source's colour of the body, once all else is set.
+fn colour_body(source: &Material, target: &mut Material, role: Role, body: Body) -> Result<(), RemapError> {
+    // Two Lambert terms are the same thing.
+    let is_same = role == Role::DiffuseReflectance && source.by_role(role).is_some();
+    if is_same || body == Body::Copied {
+        return Ok(target.set_role(role, source.canonical().body)?);
+    }
+    Ok(target.set_diffuse_albedo(role, source.diffuse_albedo())?)
+}
+
+/// A colour multiplied by a hue; any other value as it is.
+fn tinted(value: &Value, hue: [f64; 3]) -> Value {
+    match value {
+        Value::Colour(scale) => Value::Colour(std::array::from_fn(|c| scale[c] * hue[c])),
+        other => other.clone(),
+    }
+}
+
+/// Metalness and base colour that a target takes over, where it can be a metal and is not yet, and the source is one.
+fn metal(source: &Material, target: &Material) -> Option<(f64, [f64; 3])> {
     let is_dielectric = target.by_role(Role::Metalness).is_some_and(|m| m.mean() == Some(0.0));
-    is_dielectric && source.canonical().metalness > 0.5
+    let look = source.canonical();
+    if !is_dielectric || look.metalness == 0.0 {
+        return None;
+    }
+    Some((look.metalness, look.base.or(look.f0)?))
 }
 
 /// Refuses two options that speak of the same parameter of the same model.
@@ -401,7 +434,8 @@ impl Draft {
     /// is a conductor, its scale, unless its index can be the source's.
     fn suit(&mut self, source: &Material) -> Result<(), RemapError> {
         let model = self.fixed.model();
-        if becomes_metal(source, &self.fixed) {
+        // Mostly metal: what decides the reflectance of the dielectric is hardly seen.
+        if metal(source, &self.fixed).is_some_and(|(metalness, _)| metalness > 0.5) {
             let given = &self.given;
             let role = |axis: &Axis| model.parameter(&axis.name).map(|p| p.role);
             self.axes
