@@ -181,6 +181,23 @@ impl Material {
         Some([first, widths.next().unwrap_or(first)])
     }
 
+    /// True where a parameter of a role can be seen: where it does not have the value that leaves its effect out, and is no
+    /// part of a layer that is not there.
+    pub fn shows(&self, role: Role) -> bool {
+        let Some(value) = self.by_role(role) else { return false };
+        let has = |layer| self.colour(layer).is_some_and(|weight| weight != [0.0; 3]);
+        match role {
+            Role::Anisotropy | Role::Coat | Role::Sheen | Role::Metalness | Role::DiffuseRoughness => {
+                value.colour() != Some([0.0; 3])
+            }
+            Role::SpecularColour | Role::BaseWeight => value.colour() != Some([1.0; 3]),
+            Role::CoatColour | Role::CoatRoughness | Role::CoatIndex | Role::CoatShape => has(Role::Coat),
+            Role::SheenColour | Role::SheenRoughness | Role::SheenShape => has(Role::Sheen),
+            Role::Variant => false,
+            _ => true,
+        }
+    }
+
     /// Sets parameters to what comes closest to a width: every parameter that decides one, within its range.
     ///
     /// # Errors
@@ -247,10 +264,7 @@ impl Material {
     }
 
     fn colour(&self, role: Role) -> Option<[f64; 3]> {
-        match self.by_role(role)? {
-            Value::Colour(c) => Some(c),
-            other => other.mean().map(|v| [v; 3]),
-        }
+        self.by_role(role)?.colour()
     }
 }
 

@@ -35,6 +35,14 @@ impl Value {
         }
     }
 
+    /// A colour, or a number as grey; `None` for a choice or a file.
+    pub fn colour(&self) -> Option<[f64; 3]> {
+        match self {
+            Self::Colour(c) => Some(*c),
+            other => other.mean().map(|v| [v; 3]),
+        }
+    }
+
     /// What the value consists of, as numbers that tell it from all others of its parameter.
     pub fn bits(&self) -> Vec<u64> {
         let text = |text: &str| text.bytes().map(u64::from).collect();

@@ -44,11 +44,21 @@ pub enum Role {
     Extinction,
     /// Weight of a clear layer above all others.
     Coat,
-    /// What such a layer is like.
+    /// Colour of what such a layer lets through.
+    CoatColour,
+    /// Width of its lobe, as the square root of the microfacet α.
+    CoatRoughness,
+    /// Its index of refraction.
+    CoatIndex,
+    /// What else it is like.
     CoatShape,
     /// Weight of a layer of fibres or dust.
     Sheen,
-    /// What such a layer is like.
+    /// Colour of such a layer.
+    SheenColour,
+    /// Its roughness.
+    SheenRoughness,
+    /// What else it is like.
     SheenShape,
     /// What a lobe is like beyond its width.
     LobeShape,
@@ -90,8 +100,13 @@ impl Role {
             Self::ConductorIndex => "conductor index",
             Self::Extinction => "extinction",
             Self::Coat => "coat",
+            Self::CoatColour => "colour of the coat",
+            Self::CoatRoughness => "roughness of the coat",
+            Self::CoatIndex => "index of the coat",
             Self::CoatShape => "shape of the coat",
             Self::Sheen => "sheen",
+            Self::SheenColour => "colour of the sheen",
+            Self::SheenRoughness => "roughness of the sheen",
             Self::SheenShape => "shape of the sheen",
             Self::LobeShape => "shape of the lobe",
             Self::Measurement => "measurement",
@@ -102,6 +117,20 @@ impl Role {
     /// True for what decides the colour of the diffuse reflection.
     pub fn is_body(self) -> bool {
         matches!(self, Self::DiffuseReflectance | Self::BaseColour)
+    }
+
+    /// True for what belongs to a layer above the specular lobe: the same in all models that have it, more or less.
+    pub fn is_layer(self) -> bool {
+        matches!(
+            self,
+            Self::Coat
+                | Self::CoatColour
+                | Self::CoatRoughness
+                | Self::CoatIndex
+                | Self::Sheen
+                | Self::SheenColour
+                | Self::SheenRoughness
+        )
     }
 
     /// True for what decides the width of the specular lobe.

@@ -1,7 +1,7 @@
 //! What becomes of each of the source's parameters in the target model: kept exactly, matched with an error that was
 //! measured, or lost.
 
-use lookmatch_materials::{Material, Parameter, Role, Value};
+use lookmatch_materials::{Material, Parameter, Role};
 use lookmatch_search::Axis;
 use serde::Serialize;
 
@@ -44,7 +44,7 @@ pub fn losses(probe: &Probe) -> Result<Vec<Loss>, RemapError> {
     let mut losses = Vec::new();
     for (index, parameter) in model.parameters.iter().enumerate() {
         let varies = sides.varied.contains(&index);
-        if !varies && !shows(&probe.from, parameter, &probe.from.values()[index]) {
+        if !varies && !probe.from.shows(parameter.role) {
             continue;
         }
         let (class, reason) = sides.class(probe, parameter, varies);
@@ -86,7 +86,11 @@ impl Sides {
         if role == Role::Roughness && self.is_second_width(probe, parameter) && !self.is_anisotropic() {
             return (LossClass::Lost, format!("the lobe of {} is isotropic", to.name));
         }
-        let follower = self.searched.iter().find(|target| role.trend(**target).is_some());
+        if role.is_layer() && has(role) {
+            return (LossClass::Bounded, format!("{} takes it over, in a layer of its own kind", to.name));
+        }
+        let same = self.searched.iter().find(|target| **target == role);
+        let follower = same.or_else(|| self.searched.iter().find(|target| role.trend(**target).is_some()));
         if let Some(follower) = follower {
             return (LossClass::Bounded, format!("matched by the {} of {}", follower.title(), to.name));
         }
@@ -137,23 +141,6 @@ impl Sides {
 /// True for what [`crate::plan::carry_over`] copies without a change.
 fn is_handed_over(role: Role) -> bool {
     matches!(role, Role::DiffuseReflectance | Role::ConductorIndex | Role::Extinction)
-}
-
-/// True where a value of a parameter can be seen: where it is not the one that leaves its effect out.
-fn shows(material: &Material, parameter: &Parameter, value: &Value) -> bool {
-    let off = |role| material.by_role(role).and_then(|v| v.mean()).is_none_or(|v| v == 0.0);
-    match parameter.role {
-        Role::Anisotropy | Role::Coat | Role::Sheen | Role::Metalness | Role::DiffuseRoughness => {
-            value.mean() != Some(0.0)
-        }
-        Role::SpecularColour | Role::BaseWeight => {
-            *value != Value::Colour([1.0; 3]) && value.mean() != Some(1.0)
-        }
-        Role::CoatShape => !off(Role::Coat),
-        Role::SheenShape => !off(Role::Sheen),
-        Role::Variant => false,
-        _ => true,
-    }
 }
 
 /// Mean and largest masked NRMSD of a probe.

@@ -292,6 +292,12 @@ pub(crate) fn carry_over(
             (Role::Extinction, Some([_, k])) if is_free(index) => {
                 target.set_value(index, Value::Colour(k))?
             }
+            // Layers that the source does not show stay as the target has them.
+            (role, _) if role.is_layer() && is_free(index) && source.shows(role) => {
+                if let Some(value) = source.by_role(role) {
+                    target.set_role(role, value.colour().unwrap_or([0.0; 3]))?;
+                }
+            }
             // A searched colour is one number: it takes the hue of the source's.
             (Role::DiffuseReflectance | Role::BaseColour, _) if !is_free(index) => {
                 target.set_value(index, tinted(&target.values()[index], hue(look.body)))?;

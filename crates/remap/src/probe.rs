@@ -193,7 +193,8 @@ impl Probe {
         for (material, axes, side) in
             [(&self.from, &self.source_axes, "source"), (&self.to, &self.target_axes, "target")]
         {
-            if axes.is_empty() {
+            // A source without axes is one material.
+            if axes.is_empty() && side == "target" {
                 return Err(format!("the field '{side}_axes' is empty"));
             }
             for axis in axes {

@@ -74,10 +74,10 @@ pub static MODEL: Model = Model {
         ),
         SPECULAR_COLOR,
         unit_number(("clearcoat", "CC", Role::Coat), 0.0, "Weight of the clear coat."),
-        unit_number(("clearcoat_roughness", "CR", Role::CoatShape), 0.0, COAT_ROUGHNESS_SUMMARY),
+        unit_number(("clearcoat_roughness", "CR", Role::CoatRoughness), 0.0, COAT_ROUGHNESS_SUMMARY),
         unit_colour(("sheen_color", "SH", Role::Sheen), [0.0; 3], "Colour of the sheen, linear RGB."),
         unit_number(
-            ("sheen_roughness", "SR", Role::SheenShape),
+            ("sheen_roughness", "SR", Role::SheenRoughness),
             0.0,
             "Roughness of the sheen; its square is the width of the lobe of fibres.",
         ),

@@ -102,12 +102,12 @@ pub static MODEL: Model = Model {
         ),
         unit_number(("coat_weight", "C", Role::Coat), 0.0, "Presence of the clear coat."),
         unit_colour(
-            ("coat_color", "c_c", Role::CoatShape),
+            ("coat_color", "c_c", Role::CoatColour),
             [1.0; 3],
             "Transmittance of the coat at normal incidence, in and out.",
         ),
         unit_number(
-            ("coat_roughness", "r_c", Role::CoatShape),
+            ("coat_roughness", "r_c", Role::CoatRoughness),
             0.0,
             "Roughness of the coat; its square is α.",
         ),
@@ -116,15 +116,15 @@ pub static MODEL: Model = Model {
             0.0,
             "Stretch of the coat's lobe along the tangent.",
         ),
-        layer_ior(("coat_ior", "n_c", Role::CoatShape), 1.6, "Index of refraction of the coat."),
+        layer_ior(("coat_ior", "n_c", Role::CoatIndex), 1.6, "Index of refraction of the coat."),
         unit_number(
             ("coat_darkening", "δ", Role::CoatShape),
             1.0,
             "How much reflections inside the coat darken the base.",
         ),
         unit_number(("fuzz_weight", "w_f", Role::Sheen), 0.0, "Presence of the layer of fibres."),
-        unit_colour(("fuzz_color", "c_f", Role::SheenShape), [1.0; 3], "Colour of the fibres."),
-        unit_number(("fuzz_roughness", "r_f", Role::SheenShape), 0.5, "Roughness of the layer of fibres."),
+        unit_colour(("fuzz_color", "c_f", Role::SheenColour), [1.0; 3], "Colour of the fibres."),
+        unit_number(("fuzz_roughness", "r_f", Role::SheenRoughness), 0.5, "Roughness of the layer of fibres."),
         Parameter {
             name: "energy_compensation",
             symbol: "-",

@@ -83,7 +83,7 @@ pub static MODEL: Model = Model {
         METALLIC,
         PERCEPTUAL_ROUGHNESS,
         unit_number(("clearcoat", "CC", Role::Coat), 0.0, "Weight of the second lobe."),
-        unit_number(("clearcoat_roughness", "CR", Role::CoatShape), 0.01, COAT_ROUGHNESS_SUMMARY),
+        unit_number(("clearcoat_roughness", "CR", Role::CoatRoughness), 0.01, COAT_ROUGHNESS_SUMMARY),
         principled_ior("ior", "I", Interval::closed(1.0, 100.0)),
         Parameter {
             name: "variant",
