@@ -73,7 +73,7 @@ impl std::error::Error for Usage {}
 
 fn exit_code(error: &anyhow::Error) -> u8 {
     let usage = error.is::<Usage>()
-        || error.is::<MaterialError>()
+        || error.downcast_ref::<MaterialError>().is_some_and(MaterialError::is_usage)
         || error.downcast_ref::<RemapError>().is_some_and(RemapError::is_usage);
     if usage { 2 } else { 1 }
 }

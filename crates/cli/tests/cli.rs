@@ -464,3 +464,94 @@ fn bad_benchmarks_are_refused() {
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(1) && message.contains("no python3 on the PATH"), "{message}");
 }
+
+#[test]
+fn the_page_of_the_catalogue_is_current() {
+    let folder = TempDir::new().unwrap();
+    let page = lookmatch(folder.path(), &["models", "--markdown"]);
+    let kept = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/models.md")).unwrap();
+    assert!(page.stdout == kept, "run: cargo run --release -- models --markdown > docs/models.md");
+}
+
+#[test]
+fn named_materials_are_sources_of_their_own() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    for (source, lost) in [("low-abc@gold-metallic-paint", false), ("merl@red-plastic", false)] {
+        let made = json(of, &["remap", source, "ggx", "--quick", "--size", "24", "-o", "p.json", "--json"]);
+        assert_eq!(made["source_points"], 1, "{source}");
+        let is_lost = |loss: &Json| loss["class"] == "lost";
+        assert_eq!(made["losses"].as_array().unwrap().iter().any(is_lost), lost, "{source}");
+        let applied = json(of, &["apply", "p.json", "--json"]);
+        assert_eq!(applied["target"]["model"], "ggx");
+    }
+    let listed = lookmatch(of, &["models", "low-abc"]);
+    assert!(String::from_utf8_lossy(&listed.stdout).contains("low-abc@chrome "));
+    refused(of, &["remap", "low-abc@chromee", "ggx", "-o", "p.json"], 2, &["did you mean 'chrome'?"]);
+    refused(of, &["remap", "ggx", "merl", "-o", "p.json"], 2, &["merl", "only be a source"]);
+}
+
+#[test]
+fn what_a_target_cannot_show_is_said() {
+    let folder = TempDir::new().unwrap();
+    let job = |from: &'static str, to: &'static str| {
+        let made =
+            json(folder.path(), &["remap", from, to, "--quick", "--size", "16", "-o", "p.json", "--json"]);
+        let losses = made["losses"].as_array().unwrap().clone();
+        move |parameter: &str| {
+            let loss = losses.iter().find(|loss| loss["parameter"] == parameter);
+            loss.map(|loss| (loss["class"].as_str().unwrap().to_owned(), loss["nrmsd"].is_array()))
+        }
+    };
+    let brushed = job("ward:roughness_u=0.1,roughness_v=0.4,specular=0.1", "phong");
+    assert_eq!(brushed("roughness_v"), Some(("lost".into(), true)));
+    assert_eq!(brushed("diffuse"), Some(("exact".into(), false)));
+    assert_eq!(brushed("specular"), Some(("bounded".into(), true)));
+    let coated =
+        job("openpbr:coat_weight=0.5,fuzz_weight=0.3,specular_ior=1.5,specular_roughness=0.4", "gltf");
+    assert_eq!(coated("coat_weight"), Some(("bounded".into(), true)));
+    assert_eq!(coated("coat_darkening"), Some(("lost".into(), true)));
+    assert_eq!(coated("base_diffuse_roughness"), None, "what does not show is not told");
+    let plain = job("openpbr:coat_weight=0.5,specular_ior=1.5,specular_roughness=0.4", "ggx");
+    assert_eq!(plain("coat_weight"), Some(("lost".into(), true)));
+}
+
+#[test]
+fn pairs_are_scored_and_a_stopped_run_goes_on() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    let job = ["pairs", "ward", "lambert", "merl", "gltf", "--size", "16", "-o", "pairs", "--json"];
+    let run = json(of, &job);
+    let pairs = run["pairs"].as_array().unwrap();
+    // Every ordered pair of different models, but none to measured materials.
+    assert_eq!(pairs.len(), 9);
+    let finite =
+        |pair: &Json| ["probe", "copy", "probe_masked", "copy_masked"].iter().all(|k| pair[k].is_number());
+    assert!(pairs.iter().all(finite), "{run}");
+    let svg = std::fs::read_to_string(of.join("pairs/pairs.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.matches("<title>").count() == 18);
+    assert!(std::fs::read_to_string(of.join("pairs/pairs.md")).unwrap().contains("| **merl** |"));
+    // What is known is not worked out again.
+    let kept = of.join("pairs/pairs.json");
+    let text = std::fs::read_to_string(&kept).unwrap();
+    std::fs::write(&kept, text.replacen("\"points\": 36", "\"points\": 37", 1)).unwrap();
+    let again = json(of, &job);
+    assert_eq!(again["pairs"].as_array().unwrap().iter().filter(|pair| pair["points"] == 37).count(), 1);
+    refused(of, &["pairs", "merl", "-o", "pairs"], 2, &["none of the models can be a target"]);
+    refused(of, &["pairs", "ward", "merl-file", "-o", "pairs"], 2, &["merl-file", "needs a file"]);
+}
+
+#[test]
+fn measurements_that_cannot_be_read_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    std::fs::write(of.join("short.binary"), [90u8, 0, 0, 0, 90]).unwrap();
+    let render =
+        |material: &'static str| ["render", "reference", "--size", "8", "-o", "a.png", "-m", material];
+    refused(of, &render("merl-file"), 2, &["file=PATH", "90 x 90 x 180"]);
+    refused(of, &render("merl-file:file=none.binary"), 1, &["none.binary"]);
+    refused(of, &render("merl-file:file=short.binary"), 1, &["short.binary"]);
+    refused(of, &render("ggx-conductor:conductor=gld"), 2, &["did you mean 'gold'?"]);
+    refused(of, &render("lafortune:weight=1/2,exponent=1/2/3"), 2, &["weight has 2 numbers for 3 lobes"]);
+    refused(of, &render("merl:material=red-plastik"), 2, &["did you mean 'red-plastic'?"]);
+}

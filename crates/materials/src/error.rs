@@ -113,6 +113,13 @@ pub enum MaterialError {
     },
 }
 
+impl MaterialError {
+    /// True where the request makes no sense; false where a file that it names cannot be used.
+    pub fn is_usage(&self) -> bool {
+        !matches!(self, Self::BadFile { .. })
+    }
+}
+
 fn hint(nearest: &Option<String>) -> String {
     nearest.as_ref().map(|n| format!(", did you mean '{n}'?")).unwrap_or_default()
 }

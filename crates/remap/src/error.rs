@@ -72,6 +72,9 @@ pub enum RemapError {
 impl RemapError {
     /// True where the request itself is wrong, as opposed to its execution.
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Material(_) | Self::Option(_) | Self::Lattice(_) | Self::OutsideProbe { .. })
+        match self {
+            Self::Material(error) => error.is_usage(),
+            other => matches!(other, Self::Option(_) | Self::Lattice(_) | Self::OutsideProbe { .. }),
+        }
     }
 }

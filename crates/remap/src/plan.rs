@@ -205,7 +205,7 @@ impl Plan {
         target.suit(&from_material)?;
         if target.axes.is_empty() {
             let why = if to.searched.is_empty() {
-                "has no parameters to search"
+                "has no parameters to search: it can only be a source"
             } else {
                 "is fixed in every parameter"
             };
