@@ -90,7 +90,7 @@ impl MaterialError {
 }
 
 /// The differences of materials under a light.
-fn differences(
+pub(crate) fn differences(
     stage: &Stage,
     light: Illumination,
     materials: &[Named],

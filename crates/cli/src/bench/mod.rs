@@ -4,6 +4,7 @@
 //! counts. Accuracy is the difference from converged pictures.
 
 pub(crate) mod accuracy;
+pub(crate) mod catalogue;
 pub(crate) mod document;
 mod machine;
 mod materials;
@@ -72,6 +73,8 @@ pub(crate) struct Report {
     pub(crate) preparation: Preparation,
     #[serde(flatten)]
     pub(crate) accuracy: Accuracy,
+    /// Every model of the catalogue.
+    pub(crate) models: Vec<catalogue::Measured>,
     /// CPU time that the peer needs for a picture with our error, over ours in a batch: of the materials that were compared,
     /// the one with the least.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -91,11 +94,13 @@ impl Report {
         let (stage, preparation) = Stage::prepare(&scene, effort.size)?;
         let timing = Timing::measure(&stage, &effort)?;
         let accuracy = Accuracy::measure(&stage, &effort)?;
+        let models = catalogue::measure(&stage, &effort)?;
         let peer = peer.map(|p| PeerReport::measure(p, &stage, &effort)).transpose()?;
         Ok(Self {
             timing,
             preparation,
             accuracy,
+            models,
             equal_error_ratio: peer.as_ref().map(PeerReport::equal_error_ratio),
             peer,
             effort,

@@ -57,6 +57,12 @@ impl PictureCost {
     }
 }
 
+/// CPU milliseconds of a picture pair of each of some materials, as one of a batch: the fastest of some runs.
+pub(crate) fn pair_cpu_ms(stage: &Stage, batch: &[Material], runs: usize) -> anyhow::Result<f64> {
+    let batches = vec![batch.to_vec(); runs];
+    on_one_thread(|| each_in_batch(&[&stage.point, &stage.environment], &batches))
+}
+
 /// Works in a pool of one thread: its clock then counts all the work, and nothing but the work.
 fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().context("cannot start a thread")?;
@@ -65,16 +71,21 @@ fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> anyhow::Result<T> 
 
 /// The cost per material of pictures by all of some renderers; each run has a batch.
 fn cost(renderers: &[&Renderer], batches: &[Vec<Material>]) -> PictureCost {
-    // From materials to everything that the subject's pixels hold, linear RGB.
-    let render = |materials: &[Material]| {
-        let lobes = Lobes::new(materials.iter().map(Material::bsdf).collect());
-        renderers.iter().for_each(|renderer| drop(black_box(renderer.subject_planes(&lobes))));
-    };
-    let each = |milliseconds: f64| milliseconds / batches[0].len() as f64;
+    let singles = |run: usize| batches[run].chunks(1).for_each(|material| render(renderers, material));
     PictureCost {
-        image_cpu_ms: each(fastest(batches.len(), |run| render(&batches[run]))),
-        single_image_cpu_ms: each(fastest(batches.len(), |run| batches[run].chunks(1).for_each(render))),
+        image_cpu_ms: each_in_batch(renderers, batches),
+        single_image_cpu_ms: fastest(batches.len(), singles) / batches[0].len() as f64,
     }
+}
+
+fn each_in_batch(renderers: &[&Renderer], batches: &[Vec<Material>]) -> f64 {
+    fastest(batches.len(), |run| render(renderers, &batches[run])) / batches[0].len() as f64
+}
+
+/// From materials to everything that the subject's pixels hold, linear RGB.
+fn render(renderers: &[&Renderer], materials: &[Material]) {
+    let lobes = Lobes::new(materials.iter().map(Material::bsdf).collect());
+    renderers.iter().for_each(|renderer| drop(black_box(renderer.subject_planes(&lobes))));
 }
 
 /// CPU milliseconds of the fastest of some runs, which are told their number.
