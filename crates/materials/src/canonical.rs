@@ -68,7 +68,7 @@ impl Material {
     /// The share of uniform light that the diffuse reflection sends back, per channel: what a furnace would show. Good to
     /// some thousandths.
     pub fn diffuse_albedo(&self) -> [f64; 3] {
-        let bsdf = self.diffuse_only().bsdf();
+        let bsdf = self.diffuse_bsdf();
         let mut albedo = bsdf.diffuse();
         if bsdf.sampling().is_none() {
             return albedo;
@@ -123,7 +123,7 @@ impl Material {
             (None, Some(base)) => base.map(|v| v * (1.0 - metalness)),
             (None, None) if is_metal => [0.0; 3],
             // Measured materials and the like: what their diffuse reflection is, if it is Lambert's.
-            (None, None) => self.diffuse_only().bsdf().diffuse(),
+            (None, None) => self.diffuse_bsdf().diffuse(),
         };
         let f0 = self.dielectric_f0(index).map(|dielectric| {
             std::array::from_fn(|c| {

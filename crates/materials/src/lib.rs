@@ -11,6 +11,7 @@
 //! This crate reads the files of measurements that a material names, and nothing else.
 
 pub mod albedo;
+mod body;
 pub mod bsdf;
 pub mod burley;
 mod canonical;
@@ -42,7 +43,7 @@ pub use canonical::{Canonical, hue};
 pub use error::MaterialError;
 pub use geometry::Geometry;
 pub use material::{Material, MeasuredFile, Value};
-pub use model::{Alias, Family, Model, Named, Preset, Values};
+pub use model::{Alias, Build, Family, Load, Model, Named, Preset, Values};
 pub use models::{by_name, registry};
 pub use parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale, Trend};
 pub use real::Real;

@@ -147,7 +147,7 @@ impl Material {
                 return Err(MaterialError::NoFile { model, name, content: content.to_owned() });
             }
         }
-        let together = (self.model.check)(&Values { model: self.model, values: &self.values });
+        let together = (self.model.check)(&self.as_values());
         let model = || self.model.name.to_owned();
         together.map_err(|reason| MaterialError::Inconsistent { model: model(), reason })?;
         Ok(self)
@@ -254,32 +254,18 @@ impl Material {
         self.model.parameters.iter().position(|p| p.role == role).map(|i| self.values[i].clone())
     }
 
-    /// The material with its diffuse reflection alone (Guarnera *et al.* 2018, 3.1): every specular reflectance set to 0, or
-    /// what [`Model::diffuse_only`] says.
-    pub fn diffuse_only(&self) -> Self {
-        let mut copy = self.clone();
-        if let Some(bare) = self.model.diffuse_only {
-            for (name, value) in bare(&Values { model: self.model, values: &self.values }) {
-                if let Some(index) = self.model.parameters.iter().position(|p| p.name == name) {
-                    copy.values[index] = value;
-                }
-            }
-            return copy;
-        }
-        for (parameter, value) in self.model.parameters.iter().zip(&mut copy.values) {
-            if matches!(parameter.role, Role::SpecularReflectance | Role::LobeHeight) {
-                *value = match value {
-                    Value::Number(_) => Value::Number(0.0),
-                    _ => Value::Colour([0.0; 3]),
-                };
-            }
-        }
-        copy
-    }
-
     /// Builds its BSDF.
     pub fn bsdf(&self) -> Box<dyn Bsdf> {
-        (self.model.build)(&Values { model: self.model, values: &self.values })
+        (self.model.build)(&self.as_values())
+    }
+
+    pub(crate) fn as_values(&self) -> Values<'_> {
+        Values { model: self.model, values: &self.values }
+    }
+
+    /// Replaces a value by one that is known to be of its kind and within its range.
+    pub(crate) fn replace(&mut self, index: usize, value: Value) {
+        self.values[index] = value;
     }
 
     fn check(&self, index: usize, value: Value) -> Result<Value, MaterialError> {

@@ -59,6 +59,12 @@ pub enum Family {
     Measured,
 }
 
+/// Makes a BSDF of values.
+pub type Build = fn(&Values) -> Box<dyn Bsdf>;
+
+/// Reads a file of measurements; an error says what is wrong with it.
+pub type Load = fn(&Path) -> Result<Arc<dyn Bsdf>, String>;
+
 /// A family of materials.
 #[derive(Serialize)]
 pub struct Model {
@@ -93,22 +99,21 @@ pub struct Model {
     /// Materials with names of their own.
     #[serde(skip)]
     pub presets: fn() -> &'static [Preset],
-    /// What takes everything but the diffuse reflection from a material, as values of parameters; `None` where a specular
-    /// reflectance of 0 does.
+    /// Builds the diffuse reflection, for models that have no colour of the body to tell it by: see [`crate::Material::diffuse_bsdf`].
     #[serde(skip)]
-    pub diffuse_only: Option<fn(&Values) -> Vec<(&'static str, Value)>>,
+    pub diffuse_only: Option<Build>,
     /// What values must fulfil together, beyond the range of each; an error says what is wrong.
     #[serde(skip)]
     pub check: fn(&Values) -> Result<(), String>,
-    /// Reads a file of measurements, for models with a parameter of that kind; an error says what is wrong.
+    /// Reads a file of measurements, for models with a parameter of that kind.
     #[serde(skip)]
-    pub load: Option<fn(&Path) -> Result<Arc<dyn Bsdf>, String>>,
+    pub load: Option<Load>,
     /// What conformance vectors call the model, and how its BSDF is built from their parameters.
     #[serde(skip)]
     pub vectors: Option<(&'static str, Builder)>,
     /// Builds the BSDF of checked values.
     #[serde(skip)]
-    pub build: fn(&Values) -> Box<dyn Bsdf>,
+    pub build: Build,
 }
 
 impl Model {

@@ -58,7 +58,7 @@ fn a_known_reflection_survives_being_written_and_read() {
         }
     }
     assert!(worst < 0.01, "off by {worst}");
-    let diffuse = material.diffuse_only().bsdf().diffuse();
+    let diffuse = material.diffuse_bsdf().diffuse();
     // The plastic's highlight is nowhere quite 0.
     assert!((0..3).all(|c| (0.0..0.004).contains(&(diffuse[c] - [0.2, 0.3, 0.1][c]))), "{diffuse:?}");
     let sampling = measured.sampling().unwrap();

@@ -54,8 +54,7 @@ impl SplitLobes {
     /// Expands materials and their diffuse reflections, on all cores.
     pub fn new(materials: &[Material]) -> Self {
         let whole = Lobes::new(materials.iter().map(Material::bsdf).collect());
-        let bare: Vec<Material> = materials.iter().map(Material::diffuse_only).collect();
-        let all = Lobes::new(bare.iter().map(Material::bsdf).collect());
+        let all = Lobes::new(materials.iter().map(Material::diffuse_bsdf).collect());
         let plain =
             |i: usize| all.expanded[i].is_none() && all.bsdfs[i].diffuse() == whole.bsdfs[i].diffuse();
         let is_plain = (0..materials.len()).map(plain).collect();
@@ -63,7 +62,7 @@ impl SplitLobes {
         let mut places: HashMap<DiffuseKey, usize> = HashMap::new();
         let mut keys = Vec::new();
         let mut diffuse_of = Vec::with_capacity(materials.len());
-        for ((bsdf, expanded), material) in all.bsdfs.into_iter().zip(all.expanded).zip(&bare) {
+        for ((bsdf, expanded), material) in all.bsdfs.into_iter().zip(all.expanded).zip(materials) {
             let key = diffuse_key(&*bsdf, expanded.as_ref(), material);
             let place = *places.entry(key).or_insert(keys.len());
             diffuse_of.push(place);

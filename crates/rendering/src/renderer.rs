@@ -33,7 +33,7 @@ mod accuracy;
 pub enum Part {
     /// Diffuse and specular.
     Full,
-    /// The diffuse reflection alone: see [`Material::diffuse_only`].
+    /// The diffuse reflection alone: see [`Material::diffuse_bsdf`].
     DiffuseOnly,
 }
 
@@ -179,7 +179,7 @@ impl Renderer {
     pub fn render_batch(&self, materials: &[&Material], part: Part) -> Vec<Image> {
         let bsdf = |m: &&Material| match part {
             Part::Full => m.bsdf(),
-            Part::DiffuseOnly => m.diffuse_only().bsdf(),
+            Part::DiffuseOnly => m.diffuse_bsdf(),
         };
         let lobes = Lobes::new(materials.iter().map(bsdf).collect());
         let planes = self.subject_planes(&lobes);

@@ -201,10 +201,10 @@ mod tests {
     use crate::Material;
 
     #[test]
-    fn switching_the_lobe_off_leaves_the_diffuse_reflection() {
+    fn the_diffuse_reflection_is_that_of_the_article() {
         let material = Material::parse("ashikhmin-shirley:diffuse=0.4,f0=0.3,exponent=50").unwrap();
         let mirror = ([0.6, 0.0, 0.8], [-0.6, 0.0, 0.8]);
-        let rest = material.diffuse_only().bsdf().evaluate(mirror.0, mirror.1)[0];
+        let rest = material.diffuse_bsdf().evaluate(mirror.0, mirror.1)[0];
         let angular = (1.0 - 0.6f64.powi(5)).powi(2);
         assert!((rest - 28.0 * 0.4 * 0.7 / (23.0 * PI) * angular).abs() < 1e-12);
     }

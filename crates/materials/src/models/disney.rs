@@ -40,7 +40,6 @@ use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::{mix, schlick_weight};
 use crate::masking::Masking;
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::*;
 use crate::parameter::{Kind, Parameter, Role};
@@ -78,16 +77,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular", "roughness"],
     searched: &["specular", "roughness"],
-    diffuse_only: Some(|v| {
-        let body = v.colour("base_color").map(|c| c * (1.0 - v.number("metallic")));
-        vec![
-            ("base_color", Value::Colour(body)),
-            ("metallic", Value::Number(0.0)),
-            ("specular", Value::Number(0.0)),
-            ("sheen", Value::Number(0.0)),
-            ("clearcoat", Value::Number(0.0)),
-        ]
-    }),
     build: |v| Box::new(Disney::new(&Inputs::of(v))),
     vectors: Some(("disney2012", vector)),
     ..Model::BLANK

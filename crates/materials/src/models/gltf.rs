@@ -45,7 +45,6 @@ use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::{f0_from_ior, mix, schlick_weight};
 use crate::masking::Masking;
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::*;
 use crate::parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
@@ -90,16 +89,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["ior", "roughness"],
     searched: &["ior", "roughness"],
-    diffuse_only: Some(|v| {
-        let body = v.colour("base_color").map(|c| c * (1.0 - v.number("metallic")));
-        vec![
-            ("base_color", Value::Colour(body)),
-            ("metallic", Value::Number(0.0)),
-            ("specular", Value::Number(0.0)),
-            ("clearcoat", Value::Number(0.0)),
-            ("sheen_color", Value::Colour([0.0; 3])),
-        ]
-    }),
     check: |v| match v.number("ior") {
         ior if ior > 0.0 && ior < 1.0 => Err(format!("ior={ior}: 1 or more, or 0 for full reflectance")),
         _ => Ok(()),
@@ -294,17 +283,7 @@ fn vector(p: &Parameters) -> Option<Box<dyn Bsdf>> {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
-
     use crate::Material;
-
-    #[test]
-    fn without_its_lobes_it_is_lambert() {
-        let text = "gltf:base_color=0.8,metallic=0.5,clearcoat=0.3,sheen_color=0.2,roughness=0.1";
-        let bsdf = Material::parse(text).unwrap().diffuse_only().bsdf();
-        let f = bsdf.evaluate([0.6, 0.0, 0.8], [-0.8, 0.0, 0.6]);
-        assert!(f.iter().all(|v| (v - 0.4 / PI).abs() < 1e-15), "{f:?}");
-    }
 
     #[test]
     fn an_index_below_one_is_refused_but_for_zero() {

@@ -28,7 +28,6 @@ use std::f64::consts::FRAC_1_PI;
 use crate::distribution::Distribution;
 use crate::fresnel::{mix, schlick_weight};
 use crate::masking::Masking;
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::gltf::{ggx, largest, microfacets};
 use crate::models::shared::*;
@@ -56,7 +55,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular", "glossiness"],
     searched: &["specular", "glossiness"],
-    diffuse_only: Some(|v| vec![("diffuse", Value::Colour(body(v))), ("specular", Value::Colour([0.0; 3]))]),
     build: |v| {
         Box::new(SpecularGlossiness {
             body: body(v),

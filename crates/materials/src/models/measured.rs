@@ -4,24 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 use crate::distribution::{Distribution, Shape};
-use crate::material::Value;
-use crate::parameter::{Kind, Parameter, Role};
 use crate::{Geometry, Real, Sampling, Technique};
-
-/// Which part of the measured reflection a material has.
-pub(super) const PART: Parameter = Parameter {
-    name: "part",
-    symbol: "-",
-    role: Role::Variant,
-    unit: "-",
-    summary: "whole, or diffuse: only the brightest Lambert term that stays below the measurement within 60° of the normal.",
-    kind: Kind::Choice { options: &["whole", "diffuse"] },
-};
-
-/// The values that leave the diffuse part of a measurement.
-pub(super) fn diffuse_part() -> Vec<(&'static str, Value)> {
-    vec![("part", Value::Choice("diffuse"))]
-}
 
 /// A BRDF per channel, in double precision.
 pub(super) type Measurement<'a> = &'a dyn Fn(&Geometry<f64>) -> [f64; 3];

@@ -22,9 +22,9 @@
 
 use std::sync::{LazyLock, OnceLock};
 
-use crate::model::{Family, Model, Preset};
+use crate::model::{Family, Model, Preset, Values};
 use crate::models::lambert::Lambert;
-use crate::models::measured::{PART, difference, diffuse_part, lambert_below, sampling};
+use crate::models::measured::{difference, lambert_below, sampling};
 use crate::parameter::{Kind, Parameter, Role};
 use crate::{Geometry, Lobe, Real, Sampling};
 
@@ -38,29 +38,24 @@ pub static MODEL: Model = Model {
     has_fresnel: true,
     is_reciprocal: false,
     largest_albedo: 1.05,
-    parameters: &[
-        Parameter {
-            name: "material",
-            symbol: "-",
-            role: Role::Measurement,
-            unit: "-",
-            summary: "Name of the measured material.",
-            kind: Kind::Choice { options: MATERIALS },
-        },
-        PART,
-    ],
+    parameters: &[Parameter {
+        name: "material",
+        symbol: "-",
+        role: Role::Measurement,
+        unit: "-",
+        summary: "Name of the measured material.",
+        kind: Kind::Choice { options: MATERIALS },
+    }],
     presets: || &PRESETS,
-    diffuse_only: Some(|_| diffuse_part()),
-    build: |v| {
-        let index = MATERIALS.iter().position(|m| *m == v.choice("material")).unwrap_or(0);
-        let fit = &FITS[index];
-        match v.choice("part") {
-            "diffuse" => Box::new(Lambert { diffuse: fit.lambert() }),
-            _ => Box::new(fit),
-        }
-    },
+    diffuse_only: Some(|v| Box::new(Lambert { diffuse: fit(v).lambert() })),
+    build: |v| Box::new(fit(v)),
     ..Model::BLANK
 };
+
+fn fit(v: &Values) -> &'static Fit {
+    let index = MATERIALS.iter().position(|m| *m == v.choice("material")).unwrap_or(0);
+    &FITS[index]
+}
 
 /// The materials, in the order of their networks.
 const MATERIALS: &[&str] = &[
@@ -362,7 +357,7 @@ mod tests {
     #[test]
     fn the_diffuse_part_is_a_lambert_term() {
         let whole = Material::named("merl@red-plastic").unwrap();
-        let diffuse = whole.diffuse_only().bsdf();
+        let diffuse = whole.diffuse_bsdf();
         assert!(whole.bsdf().diffuse() == [0.0; 3] && diffuse.sampling().is_none());
         let (wi, wo) = (direction(0.9, 0.0), direction(0.6, 0.5));
         let (all, part) = (whole.bsdf().evaluate(wi, wo), diffuse.evaluate(wi, wo));

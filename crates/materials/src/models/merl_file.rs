@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 use crate::model::{Family, Model, Values};
 use crate::models::lambert::Lambert;
-use crate::models::measured::{PART, difference, diffuse_part, lambert_below, sampling};
+use crate::models::measured::{difference, lambert_below, sampling};
 use crate::parameter::{Kind, Parameter, Role};
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling};
 
@@ -38,20 +38,17 @@ pub static MODEL: Model = Model {
     family: Family::Measured,
     has_fresnel: true,
     is_reciprocal: true,
-    parameters: &[
-        Parameter {
-            name: "file",
-            symbol: "-",
-            role: Role::Measurement,
-            unit: "-",
-            summary: "The measurement, in the format of the MERL database.",
-            kind: Kind::File {
-                content: "a .binary file in the format of the MERL database (90 x 90 x 180 values)",
-            },
+    parameters: &[Parameter {
+        name: "file",
+        symbol: "-",
+        role: Role::Measurement,
+        unit: "-",
+        summary: "The measurement, in the format of the MERL database.",
+        kind: Kind::File {
+            content: "a .binary file in the format of the MERL database (90 x 90 x 180 values)",
         },
-        PART,
-    ],
-    diffuse_only: Some(|_| diffuse_part()),
+    }],
+    diffuse_only: Some(diffuse),
     load: Some(load),
     build,
     ..Model::BLANK
@@ -68,11 +65,15 @@ const LENGTH: usize = HEADER + 3 * 8 * COUNT;
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 fn build(v: &Values) -> Box<dyn Bsdf> {
-    match (v.file("file"), v.choice("part")) {
-        (None, _) => Box::new(Lambert { diffuse: [0.0; 3] }),
-        (Some(table), "diffuse") => Box::new(Lambert { diffuse: lambert_below(&|g| table.specular(g)) }),
-        (Some(table), _) => Box::new(Shared(table)),
+    match v.file("file") {
+        None => Box::new(Lambert { diffuse: [0.0; 3] }),
+        Some(table) => Box::new(Shared(table)),
     }
+}
+
+fn diffuse(v: &Values) -> Box<dyn Bsdf> {
+    let below = |table: Arc<dyn Bsdf>| lambert_below(&|g| table.specular(g));
+    Box::new(Lambert { diffuse: v.file("file").map_or([0.0; 3], below) })
 }
 
 fn load(path: &Path) -> Result<Arc<dyn Bsdf>, String> {

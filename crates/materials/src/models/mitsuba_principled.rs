@@ -35,7 +35,6 @@ use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::{Fresnel, f0_from_ior, mix, schlick_weight};
 use crate::masking::Masking;
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::*;
 use crate::parameter::{Interval, Role};
@@ -65,17 +64,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["eta", "roughness"],
     searched: &["eta", "roughness"],
-    diffuse_only: Some(|v| {
-        let body = v.colour("base_color").map(|c| c * (1.0 - v.number("metallic")));
-        vec![
-            ("base_color", Value::Colour(body)),
-            ("metallic", Value::Number(0.0)),
-            ("eta", Value::Number(1.0)),
-            ("spec_tint", Value::Number(0.0)),
-            ("sheen", Value::Number(0.0)),
-            ("clearcoat", Value::Number(0.0)),
-        ]
-    }),
     build: |v| Box::new(Principled::new(&Inputs::of(v))),
     vectors: Some(("principled_mitsuba3", vector)),
     ..Model::BLANK

@@ -45,7 +45,6 @@ use crate::distribution::Distribution;
 use crate::fresnel::{Fresnel, f0_from_ior};
 use crate::fuzz::Fuzz;
 use crate::layers::{F82, Gloss, albedo, facets, ggx, lerp, mean};
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
 use crate::parameter::{Kind, Parameter, Role};
@@ -124,7 +123,11 @@ pub static MODEL: Model = Model {
         ),
         unit_number(("fuzz_weight", "w_f", Role::Sheen), 0.0, "Presence of the layer of fibres."),
         unit_colour(("fuzz_color", "c_f", Role::SheenColour), [1.0; 3], "Colour of the fibres."),
-        unit_number(("fuzz_roughness", "r_f", Role::SheenRoughness), 0.5, "Roughness of the layer of fibres."),
+        unit_number(
+            ("fuzz_roughness", "r_f", Role::SheenRoughness),
+            0.5,
+            "Roughness of the layer of fibres.",
+        ),
         Parameter {
             name: "energy_compensation",
             symbol: "-",
@@ -136,16 +139,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular_ior", "specular_roughness"],
     searched: &["specular_ior", "specular_roughness"],
-    diffuse_only: Some(|v| {
-        let dielectric = 1.0 - v.number("base_metalness");
-        vec![
-            ("base_color", Value::Colour(v.colour("base_color").map(|c| c * dielectric))),
-            ("base_metalness", Value::Number(0.0)),
-            ("specular_weight", Value::Number(0.0)),
-            ("coat_weight", Value::Number(0.0)),
-            ("fuzz_weight", Value::Number(0.0)),
-        ]
-    }),
     build: |v: &Values| {
         let compensated = v.choice("energy_compensation") == "turquin";
         let mut pbr = Openpbr::new(&|name| v.number(name), &|name| v.colour(name), compensated);

@@ -90,7 +90,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["diffuse", "sigma"],
     searched: &["diffuse", "sigma"],
-    diffuse_only: Some(|_| Vec::new()),
     build: |v| {
         let variant = variant(v.choice("variant")).unwrap_or(Variant::Qualitative);
         let roughness = v.number(if variant.reads_sigma() { "sigma" } else { "roughness" });

@@ -41,7 +41,6 @@ use crate::distribution::Distribution;
 use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
 use crate::fuzz::Fuzz;
 use crate::layers::{F82, albedo, facets, ggx, lerp, mean};
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
 use crate::parameter::{Kind, Parameter, Role};
@@ -104,7 +103,11 @@ pub static MODEL: Model = Model {
             "Transmittance of the coat at normal incidence.",
         ),
         unit_number(("sheen_weight", "w_h", Role::Sheen), 0.0, "Weight of the layer of fibres."),
-        unit_number(("sheen_roughness", "r_h", Role::SheenRoughness), 0.5, "Roughness of the layer of fibres."),
+        unit_number(
+            ("sheen_roughness", "r_h", Role::SheenRoughness),
+            0.5,
+            "Roughness of the layer of fibres.",
+        ),
         unit_colour(("sheen_tint", "c_h", Role::SheenColour), [1.0; 3], "Colour of the fibres."),
         Parameter {
             name: "distribution",
@@ -117,16 +120,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["ior", "roughness"],
     searched: &["ior", "roughness"],
-    diffuse_only: Some(|v| {
-        let dielectric = 1.0 - v.number("metallic");
-        vec![
-            ("base_color", Value::Colour(v.colour("base_color").map(|c| c * dielectric))),
-            ("metallic", Value::Number(0.0)),
-            ("specular_ior_level", Value::Number(0.0)),
-            ("coat_weight", Value::Number(0.0)),
-            ("sheen_weight", Value::Number(0.0)),
-        ]
-    }),
     build: |v: &Values| Box::new(Principled::new(v)),
     ..Model::BLANK
 };

@@ -39,7 +39,6 @@ use crate::conformance::Parameters;
 use crate::distribution::Distribution;
 use crate::fresnel::Fresnel;
 use crate::layers::{Gloss, facets, ggx, lerp, mean};
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
 use crate::parameter::{Kind, Role};
@@ -97,7 +96,11 @@ pub static MODEL: Model = Model {
         ),
         unit_number(("sheen", "w_h", Role::Sheen), 0.0, "Weight of the layer of fibres."),
         unit_colour(("sheen_color", "c_h", Role::SheenColour), [1.0; 3], "Colour of the fibres."),
-        unit_number(("sheen_roughness", "r_h", Role::SheenRoughness), 0.3, "Roughness of the layer of fibres."),
+        unit_number(
+            ("sheen_roughness", "r_h", Role::SheenRoughness),
+            0.3,
+            "Roughness of the layer of fibres.",
+        ),
         unit_number(("coat", "C", Role::Coat), 0.0, "Weight of the clear coat."),
         unit_colour(("coat_color", "c_c", Role::CoatColour), [1.0; 3], "Transmittance of the coat."),
         unit_number(
@@ -124,16 +127,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular_IOR", "specular_roughness"],
     searched: &["specular_IOR", "specular_roughness"],
-    diffuse_only: Some(|v| {
-        let dielectric = 1.0 - v.number("metalness");
-        vec![
-            ("base", Value::Number(v.number("base") * dielectric)),
-            ("metalness", Value::Number(0.0)),
-            ("specular", Value::Number(0.0)),
-            ("sheen", Value::Number(0.0)),
-            ("coat", Value::Number(0.0)),
-        ]
-    }),
     build: |v: &Values| {
         let mut surface = StandardSurface::new(&|name| v.number(name), &|name| v.colour(name));
         let sheen = v.number("sheen");

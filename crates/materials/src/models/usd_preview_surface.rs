@@ -45,7 +45,6 @@ use std::f64::consts::PI;
 
 use crate::distribution::Distribution;
 use crate::fresnel::{f0_from_ior, mix, schlick_weight};
-use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::gltf::{COAT_ROUGHNESS_SUMMARY, ggx};
 use crate::models::shared::*;
@@ -96,14 +95,6 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["ior", "roughness"],
     searched: &["ior", "roughness"],
-    diffuse_only: Some(|v| {
-        vec![
-            ("diffuse_color", Value::Colour(body(v))),
-            ("use_specular_workflow", Value::Choice("1")),
-            ("specular_color", Value::Colour([0.0; 3])),
-            ("clearcoat", Value::Number(0.0)),
-        ]
-    }),
     build: |v| Box::new(PreviewSurface::of(v)),
     ..Model::BLANK
 };

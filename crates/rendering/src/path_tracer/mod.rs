@@ -106,7 +106,7 @@ impl PathTracer {
     ) -> Vec<[f32; 3]> {
         let bsdf = match part {
             Part::Full => material.bsdf(),
-            Part::DiffuseOnly => material.diffuse_only().bsdf(),
+            Part::DiffuseOnly => material.diffuse_bsdf(),
         };
         let lobe = |sampling: lookmatch_materials::Sampling| Lobe { alpha: sampling.width(), sampling };
         let coat = Coat { bsdf: &*bsdf, diffuse: bsdf.diffuse().into(), lobe: bsdf.sampling().map(lobe) };
