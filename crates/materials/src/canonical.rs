@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
 use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
+use crate::quadrature::Gauss;
 use crate::{Geometry, Material, MaterialError, Role, Value};
 
 /// The look of a material as its parameters foretell it, without rendering: exact for some models, a rule of thumb for
@@ -31,24 +32,17 @@ impl Canonical {
     }
 }
 
-/// Cosines and weights of Gauss's rule of six points on [0, 1].
-const GAUSS: [(f64, f64); 6] = [
-    (0.033_765_242_898_424, 0.085_662_246_189_585),
-    (0.169_395_306_766_868, 0.180_380_786_524_069),
-    (0.380_690_406_958_402, 0.233_956_967_286_346),
-    (0.619_309_593_041_599, 0.233_956_967_286_346),
-    (0.830_604_693_233_132, 0.180_380_786_524_069),
-    (0.966_234_757_101_576, 0.085_662_246_189_585),
-];
-/// Azimuths between light and viewer in a half turn.
+/// Cosines of light and viewer, and azimuths between them in a half turn.
+const COSINES: usize = 6;
 const TURNS: usize = 8;
 
 /// Light and viewer all over the hemisphere, with weights `2 cos θ_i cos θ_o dω_i dμ_o`: an integral over them is what is
 /// reflected of uniform light.
 static HEMISPHERE: LazyLock<Vec<(Geometry<f32>, f64)>> = LazyLock::new(|| {
     let mut pairs = Vec::new();
-    for (cos_i, weight_i) in GAUSS {
-        for (cos_o, weight_o) in GAUSS {
+    let gauss = Gauss::new(COSINES);
+    for (cos_i, weight_i) in gauss.on(0.0, 1.0) {
+        for (cos_o, weight_o) in gauss.on(0.0, 1.0) {
             for turn in 0..TURNS {
                 let direction = |cos: f64, phi: f64| {
                     let sin = (1.0 - cos * cos).sqrt();

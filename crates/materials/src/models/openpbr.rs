@@ -40,7 +40,6 @@ use std::array::from_fn;
 
 use crate::albedo::Albedo;
 use crate::conformance::Parameters;
-use crate::diffuse::Eon;
 use crate::distribution::Distribution;
 use crate::fresnel::{Fresnel, f0_from_ior};
 use crate::fuzz::Fuzz;
@@ -48,6 +47,7 @@ use crate::layers::{F82, Gloss, albedo, facets, ggx, lerp, mean};
 use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
+use crate::oren_nayar::Eon;
 use crate::parameter::{Kind, Parameter, Role};
 use crate::physically_based;
 use crate::quadrature::Gauss;

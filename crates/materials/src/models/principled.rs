@@ -36,7 +36,6 @@
 use std::array::from_fn;
 
 use crate::albedo::Albedo;
-use crate::diffuse::Eon;
 use crate::distribution::Distribution;
 use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
 use crate::fuzz::Fuzz;
@@ -44,6 +43,7 @@ use crate::layers::{F82, albedo, facets, ggx, lerp, mean};
 use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
+use crate::oren_nayar::Eon;
 use crate::parameter::{Kind, Parameter, Role};
 use crate::{Geometry, Lobe, Real, Sampling, Technique};
 

@@ -32,7 +32,7 @@
 //! another language, whose fit of the albedo was 0.013 off there.
 
 use std::array::from_fn;
-use std::f64::consts::{FRAC_1_PI, PI, TAU};
+use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
 use crate::conformance::Parameters;
@@ -42,6 +42,7 @@ use crate::layers::{Gloss, facets, ggx, lerp, mean};
 use crate::material::Value;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
+use crate::oren_nayar::Qualitative;
 use crate::parameter::{Kind, Role};
 use crate::quadrature::{Gauss, chebyshev_coefficients, chebyshev_points, clenshaw};
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling, Technique};
@@ -150,7 +151,8 @@ struct StandardSurface {
     /// Lambert's reflection, where nothing lies above it.
     lambert: [f64; 3],
     dielectric: f64,
-    diffuse: OrenNayar,
+    body: [f64; 3],
+    diffuse: Qualitative,
     /// Weight, colour and lobe.
     sheen: Option<(f64, [f64; 3], Charlie)>,
     distribution: Distribution,
@@ -181,7 +183,8 @@ impl StandardSurface {
         Self {
             lambert: [0.0; 3],
             dielectric: 1.0 - metalness,
-            diffuse: OrenNayar::new(base_color.map(|c| base * c.powf(gamma)), number("diffuse_roughness")),
+            body: base_color.map(|c| base * c.powf(gamma)),
+            diffuse: Qualitative::new(number("diffuse_roughness")),
             sheen: None,
             distribution,
             gloss: gloss.flatten().map(|gloss| (specular, gloss)),
@@ -195,8 +198,8 @@ impl StandardSurface {
     /// Where nothing covers a smooth diffuse reflection, it is Lambert's term.
     fn with_free_lambert(mut self) -> Self {
         let uncovered = self.gloss.is_none() && self.sheen.is_none() && self.coat.is_none();
-        if uncovered && self.diffuse.b == 0.0 {
-            self.lambert = self.diffuse.colour.map(|c| c * self.dielectric);
+        if uncovered && self.diffuse.is_smooth() {
+            self.lambert = self.body.map(|c| c * self.dielectric);
             self.dielectric = 0.0;
         }
         self
@@ -216,27 +219,6 @@ fn artistic_metal(reflectance: f64, edge: f64) -> Fresnel {
     let eta = lerp((1.0 + r.sqrt()) / (1.0 - r.sqrt()), (1.0 - r) / (1.0 + r), edge);
     let k2 = ((eta + 1.0).powi(2) * r - (eta - 1.0).powi(2)) / (1.0 - r);
     Fresnel::Conductor { eta, k: k2.max(0.0).sqrt() }
-}
-
-/// Oren & Nayar's qualitative model (1994, eq. 30).
-struct OrenNayar {
-    colour: [f64; 3],
-    a: f64,
-    b: f64,
-}
-
-impl OrenNayar {
-    fn new(colour: [f64; 3], sigma: f64) -> Self {
-        let sigma2 = sigma * sigma;
-        Self { colour, a: 1.0 - 0.5 * sigma2 / (sigma2 + 0.33), b: 0.45 * sigma2 / (sigma2 + 0.09) }
-    }
-
-    /// The BRDF over its colour.
-    #[inline(always)]
-    fn at<T: Real>(&self, g: &Geometry<T>) -> T {
-        let s = (g.wi[0] * g.wo[0] + g.wi[1] * g.wo[1]).max(T::zero());
-        T::of(FRAC_1_PI * self.a) + T::of(FRAC_1_PI * self.b) * s / g.cos_i().max(g.cos_o())
-    }
 }
 
 /// Conty & Kulla's sheen.
@@ -307,7 +289,7 @@ impl Lobe for StandardSurface {
         let mut f = [zero; 3];
         if self.dielectric > 0.0 {
             let diffuse = self.diffuse.at(g);
-            f = self.diffuse.colour.map(|c| T::of(c) * diffuse);
+            f = self.body.map(|c| T::of(c) * diffuse);
             if let Some((weight, colour, charlie)) = &self.sheen {
                 let weight = T::of(*weight);
                 let (lobe, under) = (weight * charlie.at(g), one - weight * charlie.albedo(g.cos_o()));
@@ -351,7 +333,7 @@ impl Lobe for StandardSurface {
         });
         let below = [
             (specular, Technique::HalfVector(self.distribution)),
-            (self.dielectric * (mean(self.diffuse.colour) + sheen), Technique::Cosine),
+            (self.dielectric * (mean(self.body) + sheen), Technique::Cosine),
         ];
         Sampling::mixture(below.into_iter().chain(coat))
     }
