@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
+use crate::colour::{hue, mean};
 use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
 use crate::quadrature::Gauss;
 use crate::{Geometry, Material, MaterialError, Role, Value};
@@ -145,7 +146,8 @@ impl Material {
     /// Reflectance at normal incidence of all but the metal of a base colour.
     fn dielectric_f0(&self, index: Option<[[f64; 3]; 2]>) -> Option<[f64; 3]> {
         let scale = self.colour(Role::SpecularReflectance);
-        let hue = self.colour(Role::LobeHeight).map(|height| height.map(|v| v / brightest(height)));
+        let hue =
+            self.colour(Role::LobeHeight).map(|height| if height == [0.0; 3] { height } else { hue(height) });
         let tint = self.colour(Role::SpecularColour).or(hue).unwrap_or([1.0; 3]);
         let scaled = |f0: [f64; 3]| {
             let scale = scale.unwrap_or([1.0; 3]);
@@ -195,7 +197,7 @@ impl Material {
     /// # Errors
     /// None for the models of the catalogue.
     pub fn set_f0(&mut self, f0: [f64; 3]) -> Result<(), MaterialError> {
-        let mean = (f0[0] + f0[1] + f0[2]) / 3.0;
+        let mean = mean(f0);
         let some = if mean > 0.0 { 1.0 } else { 0.0 };
         let has = |role| self.by_role(role).is_some();
         if has(Role::NormalReflectance) {
@@ -230,8 +232,8 @@ impl Material {
         let Some(range) = parameter.range() else { return Ok(()) };
         let value = match self.values()[index] {
             Value::Colour(_) => Value::Colour(colour.map(|v| range.valid.nearest(v))),
-            Value::List(_) => Value::List([range.valid.nearest(grey(colour))].into()),
-            _ => Value::Number(range.valid.nearest(grey(colour))),
+            Value::List(_) => Value::List([range.valid.nearest(mean(colour))].into()),
+            _ => Value::Number(range.valid.nearest(mean(colour))),
         };
         self.set_value(index, value)
     }
@@ -246,21 +248,6 @@ impl Material {
             other => other.mean().map(|v| [v; 3]),
         }
     }
-}
-
-/// A colour divided by its largest channel; white for black.
-pub fn hue(colour: [f64; 3]) -> [f64; 3] {
-    if colour == [0.0; 3] { [1.0; 3] } else { colour.map(|v| v / brightest(colour)) }
-}
-
-/// The largest channel; 1 for black, which has no hue.
-fn brightest(colour: [f64; 3]) -> f64 {
-    let largest = colour.into_iter().fold(0.0, f64::max);
-    if largest > 0.0 { largest } else { 1.0 }
-}
-
-fn grey([r, g, b]: [f64; 3]) -> f64 {
-    if r == g && g == b { r } else { (r + g + b) / 3.0 }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ pub mod albedo;
 pub mod bsdf;
 pub mod burley;
 mod canonical;
+mod colour;
 pub mod conformance;
 pub mod distribution;
 mod error;
@@ -38,7 +39,8 @@ mod sampling;
 pub mod sheen;
 
 pub use bsdf::{Bsdf, Lobe};
-pub use canonical::{Canonical, hue};
+pub use canonical::Canonical;
+pub use colour::hue;
 pub use error::MaterialError;
 pub use geometry::Geometry;
 pub use material::{Material, MeasuredFile, Value};

@@ -25,12 +25,13 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use crate::colour::{largest, mean};
 use crate::distribution::Distribution;
 use crate::fresnel::{mix, schlick_weight};
+use crate::layers::{facets, ggx};
 use crate::masking::Masking;
 use crate::material::Value;
 use crate::model::{Family, Model, Values};
-use crate::models::gltf::{ggx, largest, microfacets};
 use crate::models::shared::*;
 use crate::parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
 use crate::sampling::Technique;
@@ -127,7 +128,7 @@ impl Lobe for SpecularGlossiness {
     #[inline(always)]
     fn specular<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
         let grazing = schlick_weight(g.cos_d);
-        let shape = microfacets(&self.distribution, self.masking, g);
+        let shape = facets(&self.distribution, self.masking, g);
         std::array::from_fn(|c| {
             let reflectance = mix(T::of(self.f0[c]), T::one(), grazing);
             mix(T::of(self.body[c] * FRAC_1_PI), shape, reflectance)

@@ -21,10 +21,10 @@
 use std::f64::consts::FRAC_1_PI;
 
 use crate::albedo::{Albedo, Interface};
+use crate::colour::mean;
 use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::Fresnel;
-use crate::layers::mean;
 use crate::masking::Masking;
 use crate::microfacet::Microfacet;
 use crate::model::{Model, Values};

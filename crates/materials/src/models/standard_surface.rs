@@ -35,13 +35,15 @@ use std::array::from_fn;
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
+use crate::colour::mean;
 use crate::conformance::Parameters;
 use crate::distribution::Distribution;
-use crate::fresnel::Fresnel;
-use crate::layers::{Gloss, facets, ggx, lerp, mean};
+use crate::fresnel::{Fresnel, mix};
+use crate::layers::{Gloss, facets, ggx};
+use crate::masking::Masking;
 use crate::material::Value;
 use crate::model::{Family, Model, Values};
-use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
+use crate::models::shared::*;
 use crate::oren_nayar::Qualitative;
 use crate::parameter::{Kind, Role};
 use crate::quadrature::{Gauss, chebyshev_coefficients, chebyshev_points, clenshaw};
@@ -86,8 +88,9 @@ pub static MODEL: Model = Model {
             0.2,
             "Roughness of the specular lobe; its square is α.",
         ),
-        layer_ior(
+        index(
             ("specular_IOR", "n", Role::RefractiveIndex),
+            LAYER_INDICES,
             1.5,
             "Index of refraction of the dielectric.",
         ),
@@ -111,7 +114,7 @@ pub static MODEL: Model = Model {
             0.0,
             "Stretch of the coat's lobe along the tangent.",
         ),
-        layer_ior(("coat_IOR", "n_c", Role::CoatShape), 1.5, "Index of refraction of the coat."),
+        index(("coat_IOR", "n_c", Role::CoatShape), LAYER_INDICES, 1.5, "Index of refraction of the coat."),
         unit_number(
             ("coat_affect_color", "-", Role::CoatShape),
             0.0,
@@ -170,7 +173,7 @@ impl StandardSurface {
     fn new(number: &dyn Fn(&str) -> f64, colour: &dyn Fn(&str) -> [f64; 3]) -> Self {
         let (coat, coat_roughness) = (number("coat"), number("coat_roughness"));
         let roughness =
-            lerp(number("specular_roughness"), 1.0, coat * number("coat_affect_roughness") * coat_roughness);
+            mix(number("specular_roughness"), 1.0, coat * number("coat_affect_roughness") * coat_roughness);
         let distribution = spread(roughness, number("specular_anisotropy"));
         let (base, base_color) = (number("base"), colour("base_color"));
         let (metalness, specular) = (number("metalness"), number("specular"));
@@ -191,7 +194,7 @@ impl StandardSurface {
             specular_color,
             metal: (metalness > 0.0).then_some((metalness, metal)),
             coat: (coat > 0.0).then(|| (coat, coat_gloss())),
-            filter: colour("coat_color").map(|c| lerp(1.0, c, coat)),
+            filter: colour("coat_color").map(|c| mix(1.0, c, coat)),
         }
     }
 
@@ -216,7 +219,7 @@ fn spread(roughness: f64, anisotropy: f64) -> Distribution {
 /// The complex index of a metal of a reflectance at normal incidence and a tint of its edges (Gulbrandsen 2014).
 fn artistic_metal(reflectance: f64, edge: f64) -> Fresnel {
     let r = reflectance.clamp(0.0, 0.99);
-    let eta = lerp((1.0 + r.sqrt()) / (1.0 - r.sqrt()), (1.0 - r) / (1.0 + r), edge);
+    let eta = mix((1.0 + r.sqrt()) / (1.0 - r.sqrt()), (1.0 - r) / (1.0 + r), edge);
     let k2 = ((eta + 1.0).powi(2) * r - (eta - 1.0).powi(2)) / (1.0 - r);
     Fresnel::Conductor { eta, k: k2.max(0.0).sqrt() }
 }
@@ -285,7 +288,7 @@ impl Lobe for StandardSurface {
     fn specular<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
         let (zero, one) = (T::zero(), T::one());
         let lobed = self.gloss.is_some() || self.metal.is_some();
-        let shape = if lobed { facets(&self.distribution, g) } else { zero };
+        let shape = if lobed { facets(&self.distribution, Masking::Correlated, g) } else { zero };
         let mut f = [zero; 3];
         if self.dielectric > 0.0 {
             let diffuse = self.diffuse.at(g);
