@@ -42,7 +42,7 @@ pub struct Order {
 impl Order {
     /// For single precision: the transmittance is 2·10⁻⁴ off from α = 0.01 on (5·10⁻⁴ for Beckmann's widest lobes and for an
     /// index near 1, 2·10⁻³ at α = 0.001 and grazing angles), its mean 10⁻⁴, and [`Internal::Reflected`] 2·10⁻³.
-    pub const FAST: Self = Self { directions: 16, heights: 12, turns: 16 };
+    pub const FAST: Self = Self { directions: 16, heights: 14, turns: 16 };
     /// About 10⁻⁶, and 10⁻⁵ for [`Internal::Reflected`].
     pub const EXACT: Self = Self { directions: 48, heights: 64, turns: 64 };
 }
