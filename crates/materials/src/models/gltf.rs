@@ -52,7 +52,7 @@ use crate::model::{Family, Model, Values};
 use crate::models::shared::*;
 use crate::parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
 use crate::sampling::Technique;
-use crate::sheen::Charlie;
+use crate::sheen::{Charlie, Visibility};
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling};
 
 /// The description of the model.
@@ -173,7 +173,7 @@ impl Gltf {
         let sheen = (colour != [0.0; 3]).then(|| Sheen {
             colour,
             strength: largest(colour),
-            lobe: Charlie::new(v.number("sheen_roughness").powi(2)),
+            lobe: Charlie::new(v.number("sheen_roughness").powi(2), Visibility::Smith),
         });
         Self {
             sheen,

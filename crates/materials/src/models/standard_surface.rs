@@ -21,7 +21,7 @@
 //! | `coat`, `coat_color`, `coat_roughness`, `coat_anisotropy`, `coat_IOR`, `coat_affect_color`, `coat_affect_roughness` | clear coat | 0, 1, 0.1, 0, 1.5, 0, 0 |
 //!
 //! The layering and the parametrisation are those of MaterialX 1.39's graph (Oren–Nayar with its qualitative A and B; sheen below the specular lobe). The
-//! sheen is Conty & Kulla's (2017) distribution `(2 + 1/r) sin^(1/r) θ_h/(2π)` over `4 (cos θ_i + cos θ_o − cos θ_i cos θ_o)`, without masking.
+//! sheen is Estevez & Kulla's (2017) distribution `(2 + 1/r) sin^(1/r) θ_h/(2π)` over `4 (cos θ_i + cos θ_o − cos θ_i cos θ_o)`, without masking.
 //!
 //! Deviations: transmission, subsurface, thin film, emission and the rotations of tangents are left out; α is at least 0.001. The sheen's albedo is integrated
 //! where MaterialX fits it. Known defects: not reciprocal; light that bounces between microfacets is lost; the Oren–Nayar term loses energy; the sheen
@@ -32,8 +32,6 @@
 //! another language, whose fit of the albedo was 0.013 off there.
 
 use std::array::from_fn;
-use std::f64::consts::{PI, TAU};
-use std::sync::OnceLock;
 
 use crate::colour::mean;
 use crate::conformance::Parameters;
@@ -46,7 +44,7 @@ use crate::model::{Family, Model, Values};
 use crate::models::shared::*;
 use crate::oren_nayar::Qualitative;
 use crate::parameter::{Kind, Role};
-use crate::quadrature::{Gauss, chebyshev_coefficients, chebyshev_points, clenshaw};
+use crate::sheen::{Charlie, Visibility};
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling, Technique};
 
 /// The description of the model.
@@ -141,8 +139,9 @@ pub static MODEL: Model = Model {
     build: |v: &Values| {
         let mut surface = StandardSurface::new(&|name| v.number(name), &|name| v.colour(name));
         let sheen = v.number("sheen");
-        surface.sheen = (sheen > 0.0)
-            .then(|| (sheen, v.colour("sheen_color"), Charlie::new(v.number("sheen_roughness"))));
+        surface.sheen = (sheen > 0.0).then(|| {
+            (sheen, v.colour("sheen_color"), Charlie::new(v.number("sheen_roughness"), Visibility::Neubelt))
+        });
         Box::new(surface.with_free_lambert())
     },
     vectors: Some(("standard_surface", vector)),
@@ -224,61 +223,6 @@ fn artistic_metal(reflectance: f64, edge: f64) -> Fresnel {
     Fresnel::Conductor { eta, k: k2.max(0.0).sqrt() }
 }
 
-/// Conty & Kulla's sheen.
-struct Charlie {
-    /// Half the power of the sine, and the scale of the distribution.
-    half_power: f64,
-    scale: f64,
-    /// Chebyshev coefficients of the albedo over the cosine.
-    albedo: OnceLock<Vec<f64>>,
-}
-
-impl Charlie {
-    fn new(roughness: f64) -> Self {
-        let power = 1.0 / roughness.max(0.005);
-        Self { half_power: 0.5 * power, scale: (2.0 + power) / (8.0 * PI), albedo: OnceLock::new() }
-    }
-
-    #[inline(always)]
-    fn at<T: Real>(&self, g: &Geometry<T>) -> T {
-        let tan2 = g.tan2_h[0] + g.tan2_h[1];
-        let sin2 = tan2 / (T::one() + tan2);
-        let (ci, co) = (g.cos_i(), g.cos_o());
-        T::of(self.scale) * sin2.powf(T::of(self.half_power)) / (ci + co - ci * co)
-    }
-
-    /// Directional albedo of a view direction, 1 at most.
-    #[inline(always)]
-    fn albedo<T: Real>(&self, cos_o: T) -> T {
-        let coefficients = self.albedo.get_or_init(|| self.interpolated());
-        clenshaw(coefficients, T::of(2.0) * cos_o.sqrt() - T::one()).max(T::zero()).min(T::one())
-    }
-
-    /// The albedo as a polynomial of the cosine's square root.
-    fn interpolated(&self) -> Vec<f64> {
-        let gauss = Gauss::new(40);
-        let value = |u: f64| {
-            let mu = (0.5 * (u + 1.0)).powi(2);
-            let wo = [(1.0 - mu * mu).sqrt(), 0.0, mu];
-            // Grazing light and retroreflection matter most: squares put nodes there.
-            gauss
-                .on(0.0, 1.0)
-                .map(|(x, weight)| {
-                    let (cos, sin) = (x * x, (1.0 - x.powi(4)).sqrt());
-                    let ring = gauss.on(0.0, 1.0).map(|(y, weight)| {
-                        let (sin_phi, cos_phi) = (PI * y * y).sin_cos();
-                        let f = Geometry::new([sin * cos_phi, sin * sin_phi, cos], wo)
-                            .map_or(0.0, |g| self.at(&g));
-                        2.0 * y * weight * f
-                    });
-                    TAU * cos * 2.0 * x * weight * ring.sum::<f64>()
-                })
-                .sum()
-        };
-        chebyshev_coefficients(&chebyshev_points(24).map(value).collect::<Vec<f64>>())
-    }
-}
-
 impl Lobe for StandardSurface {
     fn diffuse(&self) -> [f64; 3] {
         self.lambert
@@ -295,7 +239,8 @@ impl Lobe for StandardSurface {
             f = self.body.map(|c| T::of(c) * diffuse);
             if let Some((weight, colour, charlie)) = &self.sheen {
                 let weight = T::of(*weight);
-                let (lobe, under) = (weight * charlie.at(g), one - weight * charlie.albedo(g.cos_o()));
+                let (lobe, under) =
+                    (weight * charlie.brdf(g), one - weight * charlie.directional_albedo(g.cos_o()));
                 f = from_fn(|c| T::of(colour[c]) * lobe + under * f[c]);
             }
             if let Some((weight, gloss)) = &self.gloss {
