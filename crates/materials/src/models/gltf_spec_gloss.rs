@@ -17,7 +17,8 @@
 //! extension was written, not of the largest channel as in KHR_materials_specular. The defaults are those of an ordinary
 //! plastic; the format's own (1, 1, 1) mean a white mirror.
 //!
-//! Checked against the Khronos sample viewer's BRDF functions (`tests/vectors/make_shaders.py`).
+//! Checked: D, V and F against the Khronos sample viewer's BRDF functions (`tests/vectors/make_shaders.py`). How they are put together
+//! follows the text of the extension and is checked only by a second writing of it there, not independently.
 //!
 //! Known defects: `specular = 0` leaves the reflection at grazing half angles, and so does the material's diffuse part
 //! alone; white dielectrics reflect up to 1.3 times what arrives (glossiness 0.7, cos θ = 0.02), although the diffuse
