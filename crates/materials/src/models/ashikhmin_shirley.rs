@@ -6,9 +6,10 @@
 //!
 //! | parameter | meaning | default |
 //! |---|---|---|
-//! | `specular` | scale of the lobe; 1 is physical | SPEC |
-//! | `eta`, `k` (`conductor`) | complex index of refraction | iridium |
-//! | `roughness_u`, `roughness_v` (`roughness`) | α along tangent and bitangent (not squared) | 0.2 |
+//! | `specular` | scale of the lobe; 1 is physical | 1 |
+//! | `eta`, `k` (`conductor` sets both) | complex index of refraction, per channel | iridium |
+//! | `roughness_u`, `roughness_v` (`roughness` sets both) | α along tangent and bitangent (not squared) | 0.2 |
+//! | `masking` | `separable-rational` (Walter's fit), `separable`, `correlated`, `correlated-rational` or `v-groove` | separable-rational |
 //!
 //! Source: Mitsuba 0.6, `roughconductor`; Walter *et al.* 2007.
 //!

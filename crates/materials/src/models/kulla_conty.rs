@@ -41,7 +41,7 @@ pub static MODEL: Model = Model {
     reference: "Kulla & Conty 2017, Revisiting Physically Based Shading at Imageworks",
     has_fresnel: true,
     is_reciprocal: true,
-    // The lobe alone does; an uncoupled Lambert term of albedo near 1 goes above.
+    // The lobe alone stays below 1; an uncoupled Lambert term of albedo near 1 is added to it.
     largest_albedo: 2.0,
     parameters: &[
         DIFFUSE,

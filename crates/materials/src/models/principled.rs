@@ -58,7 +58,7 @@ pub static MODEL: Model = Model {
     family: Family::Production,
     has_fresnel: true,
     is_reciprocal: false,
-    // Isotropic lobes do.
+    // Isotropic lobes stay below 1.
     largest_albedo: 1.1,
     parameters: &[
         unit_colour(

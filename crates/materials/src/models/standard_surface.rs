@@ -56,7 +56,7 @@ pub static MODEL: Model = Model {
     family: Family::Production,
     has_fresnel: true,
     is_reciprocal: false,
-    // Without sheen it does.
+    // Without sheen it stays below 1.
     largest_albedo: 2.5,
     parameters: &[
         unit_number(("base", "w_b", Role::BaseWeight), 1.0, "Scale of the body's colour."),
