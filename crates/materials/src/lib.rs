@@ -44,7 +44,7 @@ pub use colour::hue;
 pub use error::MaterialError;
 pub use geometry::Geometry;
 pub use material::{Material, MeasuredFile, Value};
-pub use model::{Alias, Family, Model, Named, Preset, Values};
+pub use model::{Alias, Family, Loaded, Model, Named, NewValues, Preset, Values};
 pub use models::{by_name, registry};
 pub use parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale, Trend};
 pub use real::Real;

@@ -59,6 +59,12 @@ pub enum Family {
     Measured,
 }
 
+/// Values for some parameters, by name.
+pub type NewValues = Vec<(&'static str, Value)>;
+
+/// What was read from a file of measurements, or what is wrong with it.
+pub type Loaded = Result<Arc<dyn Bsdf>, String>;
+
 /// A family of materials.
 #[derive(Serialize)]
 pub struct Model {
@@ -96,13 +102,13 @@ pub struct Model {
     /// What takes everything but the diffuse reflection from a material, as values of parameters; `None` where a specular
     /// reflectance of 0 does.
     #[serde(skip)]
-    pub diffuse_only: Option<fn(&Values) -> Vec<(&'static str, Value)>>,
+    pub diffuse_only: Option<fn(&Values) -> NewValues>,
     /// What values must fulfil together, beyond the range of each; an error says what is wrong.
     #[serde(skip)]
     pub check: fn(&Values) -> Result<(), String>,
     /// Reads a file of measurements, for models with a parameter of that kind; an error says what is wrong.
     #[serde(skip)]
-    pub load: Option<fn(&Path) -> Result<Arc<dyn Bsdf>, String>>,
+    pub load: Option<fn(&Path) -> Loaded>,
     /// What conformance vectors call the model, and how its BSDF is built from their parameters.
     #[serde(skip)]
     pub vectors: Option<(&'static str, Builder)>,
