@@ -40,7 +40,7 @@ pub struct Order {
 }
 
 impl Order {
-    /// For single precision. From α = 0.01 on the transmittance is 2·10⁻⁴ off (6·10⁻⁴ for the widest lobes and indices near 1;
+    /// For single precision. From α = 0.01 on the transmittance is 3·10⁻⁴ off (6·10⁻⁴ for the widest lobes and indices near 1;
     /// 2·10⁻³ at α = 0.001 and grazing angles), its mean 6·10⁻⁵, and [`Internal::Reflected`] 2·10⁻³.
     pub const FAST: Self = Self { directions: 16, heights: 14, turns: 8 };
     /// About 10⁻⁶, and 10⁻⁵ for [`Internal::Reflected`].
@@ -226,7 +226,7 @@ impl Transmittance {
     }
 }
 
-/// A [`Transmittance`] for single precision: values at equal steps of the cosine's root, interpolated linearly. It is 10⁻⁵ off at
+/// A [`Transmittance`] for single precision: values at equal steps of the cosine's root, interpolated linearly. It is 10⁻⁵ off the series at
 /// the most; 5·10⁻⁵ in the one interval with the step of Walter's fit of Beckmann's masking.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransmittanceTable {
