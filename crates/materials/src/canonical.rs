@@ -3,7 +3,9 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
+use crate::colour::{hue, mean};
 use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
+use crate::quadrature::Gauss;
 use crate::{Geometry, Material, MaterialError, Role, Value};
 
 /// The look of a material as its parameters foretell it, without rendering: exact for some models, a rule of thumb for
@@ -31,24 +33,17 @@ impl Canonical {
     }
 }
 
-/// Cosines and weights of Gauss's rule of six points on [0, 1].
-const GAUSS: [(f64, f64); 6] = [
-    (0.033_765_242_898_424, 0.085_662_246_189_585),
-    (0.169_395_306_766_868, 0.180_380_786_524_069),
-    (0.380_690_406_958_402, 0.233_956_967_286_346),
-    (0.619_309_593_041_599, 0.233_956_967_286_346),
-    (0.830_604_693_233_132, 0.180_380_786_524_069),
-    (0.966_234_757_101_576, 0.085_662_246_189_585),
-];
-/// Azimuths between light and viewer in a half turn.
+/// Cosines of light and viewer, and azimuths between them in a half turn.
+const COSINES: usize = 6;
 const TURNS: usize = 8;
 
 /// Light and viewer all over the hemisphere, with weights `2 cos θ_i cos θ_o dω_i dμ_o`: an integral over them is what is
 /// reflected of uniform light.
 static HEMISPHERE: LazyLock<Vec<(Geometry<f32>, f64)>> = LazyLock::new(|| {
     let mut pairs = Vec::new();
-    for (cos_i, weight_i) in GAUSS {
-        for (cos_o, weight_o) in GAUSS {
+    let gauss = Gauss::new(COSINES);
+    for (cos_i, weight_i) in gauss.on(0.0, 1.0) {
+        for (cos_o, weight_o) in gauss.on(0.0, 1.0) {
             for turn in 0..TURNS {
                 let direction = |cos: f64, phi: f64| {
                     let sin = (1.0 - cos * cos).sqrt();
@@ -151,7 +146,8 @@ impl Material {
     /// Reflectance at normal incidence of all but the metal of a base colour.
     fn dielectric_f0(&self, index: Option<[[f64; 3]; 2]>) -> Option<[f64; 3]> {
         let scale = self.colour(Role::SpecularReflectance);
-        let hue = self.colour(Role::LobeHeight).map(|height| height.map(|v| v / brightest(height)));
+        let hue =
+            self.colour(Role::LobeHeight).map(|height| if height == [0.0; 3] { height } else { hue(height) });
         let tint = self.colour(Role::SpecularColour).or(hue).unwrap_or([1.0; 3]);
         let scaled = |f0: [f64; 3]| {
             let scale = scale.unwrap_or([1.0; 3]);
@@ -218,7 +214,7 @@ impl Material {
     /// # Errors
     /// None for the models of the catalogue.
     pub fn set_f0(&mut self, f0: [f64; 3]) -> Result<(), MaterialError> {
-        let mean = (f0[0] + f0[1] + f0[2]) / 3.0;
+        let mean = mean(f0);
         let some = if mean > 0.0 { 1.0 } else { 0.0 };
         let has = |role| self.by_role(role).is_some();
         if has(Role::NormalReflectance) {
@@ -253,8 +249,8 @@ impl Material {
         let Some(range) = parameter.range() else { return Ok(()) };
         let value = match self.values()[index] {
             Value::Colour(_) => Value::Colour(colour.map(|v| range.valid.nearest(v))),
-            Value::List(_) => Value::List([range.valid.nearest(grey(colour))].into()),
-            _ => Value::Number(range.valid.nearest(grey(colour))),
+            Value::List(_) => Value::List([range.valid.nearest(mean(colour))].into()),
+            _ => Value::Number(range.valid.nearest(mean(colour))),
         };
         self.set_value(index, value)
     }
@@ -266,21 +262,6 @@ impl Material {
     fn colour(&self, role: Role) -> Option<[f64; 3]> {
         self.by_role(role)?.colour()
     }
-}
-
-/// A colour divided by its largest channel; white for black.
-pub fn hue(colour: [f64; 3]) -> [f64; 3] {
-    if colour == [0.0; 3] { [1.0; 3] } else { colour.map(|v| v / brightest(colour)) }
-}
-
-/// The largest channel; 1 for black, which has no hue.
-fn brightest(colour: [f64; 3]) -> f64 {
-    let largest = colour.into_iter().fold(0.0, f64::max);
-    if largest > 0.0 { largest } else { 1.0 }
-}
-
-fn grey([r, g, b]: [f64; 3]) -> f64 {
-    if r == g && g == b { r } else { (r + g + b) / 3.0 }
 }
 
 #[cfg(test)]

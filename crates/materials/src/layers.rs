@@ -14,11 +14,10 @@ pub(crate) fn ggx(alpha: [f64; 2]) -> Distribution {
     Distribution { shape: Shape::Ggx, alpha: alpha.map(|a| a.max(NARROWEST)) }
 }
 
-/// A distribution as a BRDF without its Fresnel term, `D G/(4 cos θ_i cos θ_o)`, with the height-correlated Smith masking.
+/// A distribution as a BRDF without its Fresnel term: `D G/(4 cos θ_i cos θ_o)`.
 #[inline(always)]
-pub(crate) fn facets<T: Real>(distribution: &Distribution, g: &Geometry<T>) -> T {
-    distribution.density(g) * Masking::Correlated.visibility(distribution, g)
-        / (T::of(4.0) * g.cos_i() * g.cos_o())
+pub(crate) fn facets<T: Real>(distribution: &Distribution, masking: Masking, g: &Geometry<T>) -> T {
+    distribution.density(g) * masking.visibility(distribution, g) / (T::of(4.0) * g.cos_i() * g.cos_o())
 }
 
 /// The directional albedo of a distribution with a Fresnel term.
@@ -43,7 +42,7 @@ impl Gloss {
     /// Its BRDF, in 1/sr.
     #[inline(always)]
     pub(crate) fn at<T: Real>(&self, g: &Geometry<T>) -> T {
-        self.fresnel.reflectance(g.cos_d) * facets(&self.distribution, g)
+        self.fresnel.reflectance(g.cos_d) * facets(&self.distribution, Masking::Correlated, g)
     }
 }
 
@@ -81,14 +80,4 @@ impl F82 {
     pub(crate) fn average(&self) -> f64 {
         self.f0 + (1.0 - self.f0) / 21.0 - self.b / 126.0
     }
-}
-
-/// Linear interpolation from `a` to `b`.
-pub(crate) fn lerp(a: f64, b: f64, t: f64) -> f64 {
-    a + (b - a) * t
-}
-
-/// Mean of a colour's channels.
-pub(crate) fn mean(colour: [f64; 3]) -> f64 {
-    colour.iter().sum::<f64>() / 3.0
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value as Json};
 
+use crate::colour::mean;
 use crate::error::nearest;
 use crate::model::Named;
 use crate::{Bsdf, Kind, MaterialError, Model, Role, Values, by_name};
@@ -30,7 +31,7 @@ impl Value {
         match self {
             Self::Number(v) => Some(*v),
             Self::List(v) => v.first().copied(),
-            Self::Colour([r, g, b]) => Some(if r == g && g == b { *r } else { (r + g + b) / 3.0 }),
+            Self::Colour(c) => Some(mean(*c)),
             Self::Choice(_) | Self::File(_) => None,
         }
     }

@@ -30,6 +30,11 @@ impl Gauss {
     pub(crate) fn on(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         self.nodes.iter().map(move |(x, w)| (from + (to - from) * x, (to - from) * w))
     }
+
+    /// The integral of a function over an interval.
+    pub(crate) fn integrate(&self, from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
+        self.on(from, to).map(|(x, weight)| weight * f(x)).sum()
+    }
 }
 
 /// The Legendre polynomial of degree `n` and its derivative.
@@ -70,6 +75,20 @@ pub(crate) fn clenshaw<T: Real, C: Copy + Into<f64>>(coefficients: &[C], u: T) -
     T::of(coefficients[0].into()) + u * b - before
 }
 
+/// How many arguments [`clenshaw_lanes`] takes: as many sums as registers hold.
+pub(crate) const LANES: usize = 8;
+
+/// [`clenshaw`] at many arguments, whose sums do not wait for each other.
+pub(crate) fn clenshaw_lanes(coefficients: &[f64], u: [f64; LANES]) -> [f64; LANES] {
+    let (mut b, mut before) = ([0.0; LANES], [0.0; LANES]);
+    for &c in coefficients[1..].iter().rev() {
+        for k in 0..LANES {
+            (b[k], before[k]) = (c + 2.0 * u[k] * b[k] - before[k], b[k]);
+        }
+    }
+    std::array::from_fn(|k| coefficients[0] + u[k] * b[k] - before[k])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,6 +102,12 @@ mod tests {
             let exact = 2f64.powi(degree + 1) / f64::from(degree + 1);
             assert!((integral - exact).abs() < 1e-13 * exact, "{n}: {integral} instead of {exact}");
         }
+    }
+
+    #[test]
+    fn lanes_agree_with_single_sums() {
+        let (coefficients, u) = ([0.3, -0.2, 0.05, 0.7], std::array::from_fn(|k| 0.25 * k as f64 - 1.0));
+        assert_eq!(clenshaw_lanes(&coefficients, u), u.map(|u| clenshaw(&coefficients, u)));
     }
 
     #[test]

@@ -4,6 +4,15 @@
 //! fit), the exact Fresnel reflectance of a complex index, and the modern denominator `4 cos θ_i cos θ_o`. This is not the
 //! BRDF of Ashikhmin & Shirley (2000), whose denominator is `cos_d · max(cos_i, cos_o)`.
 //!
+//! | parameter | meaning | default |
+//! |---|---|---|
+//! | `specular` | scale of the lobe; 1 is physical | 1 |
+//! | `eta`, `k` (`conductor` sets both) | complex index of refraction, per channel | iridium |
+//! | `roughness_u`, `roughness_v` (`roughness` sets both) | α along tangent and bitangent (not squared) | 0.2 |
+//! | `masking` | `separable-rational` (Walter's fit), `separable`, `correlated`, `correlated-rational` or `v-groove` | separable-rational |
+//!
+//! Source: Mitsuba 0.6, `roughconductor`; Walter *et al.* 2007.
+//!
 //! Known defect: the borrowed masking does not belong to the distribution, so the directional albedo reaches 1.15 at
 //! α = 0.8 and grazing angles.
 

@@ -43,7 +43,7 @@ pub static MODEL: Model = Model {
     title: "Ashikhmin–Shirley (2000)",
     summary: "Anisotropic Phong-like lobe with Schlick's Fresnel term above a coupled diffuse reflection.",
     reference: "Ashikhmin & Shirley 2000, eq. 4, 5",
-    // With its own coupling it does; an uncoupled Lambert term or a scale above 1 goes above.
+    // With its own coupling it stays below 1; an uncoupled Lambert term or a scale above 1 goes above.
     parameters: &[
         Parameter { role: Role::BaseColour, summary: "Albedo under the lobe, linear RGB.", ..DIFFUSE },
         Parameter {

@@ -1,5 +1,17 @@
 //! Beckmann conductor: the paper's "Cook–Torrance", a rough metal with Gaussian slopes (Walter *et al.* 2007, eq. 20,
 //! 25-27), as Mitsuba 0.6's `roughconductor` evaluates it by default. No diffuse term.
+//!
+//! `f = k_s F D G/(4 cos θ_i cos θ_o)` with `D = exp(−tan² θ_h/α²)/(π α² cos⁴ θ_h)` and the exact Fresnel reflectance of a complex
+//! index per channel.
+//!
+//! | parameter | meaning | default |
+//! |---|---|---|
+//! | `specular` | scale of the lobe; 1 is physical | 1 |
+//! | `eta`, `k` (`conductor` sets both) | complex index of refraction, per channel | iridium |
+//! | `roughness_u`, `roughness_v` (`roughness` sets both) | α along tangent and bitangent (not squared) | 0.2 |
+//! | `masking` | `separable-rational` (Walter's fit), `separable`, `correlated`, `correlated-rational` or `v-groove` | separable-rational |
+//!
+//! Known defect: light that bounces between microfacets is lost.
 
 use crate::distribution::Shape;
 use crate::model::Model;

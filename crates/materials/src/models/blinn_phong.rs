@@ -42,7 +42,7 @@ pub static MODEL: Model = Model {
     summary: "Power of the half vector's cosine without Fresnel effect; exactly normalised by default.",
     reference: "Blinn 1977; Giesen 2009; Akenine-Möller et al. 2008",
     has_fresnel: false,
-    // The default variant does; the others do not.
+    // The default variant's lobe alone stays below 1; the others' do not.
     largest_albedo: 1.4,
     parameters: &[
         DIFFUSE,

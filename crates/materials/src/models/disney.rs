@@ -36,6 +36,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use crate::burley;
+use crate::colour::mean;
 use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::{mix, schlick_weight};

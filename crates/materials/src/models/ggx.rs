@@ -5,6 +5,7 @@
 //!
 //! | parameter | meaning | default |
 //! |---|---|---|
+//! | `diffuse` | albedo of the Lambert term, k_d | 0.5 |
 //! | `specular` | scale of the lobe; 1 is physical | 1 |
 //! | `ior` | index of refraction, inside over outside | 1.5 |
 //! | `roughness_u`, `roughness_v` | α along tangent and bitangent (not squared) | 0.2 |
@@ -29,7 +30,7 @@ pub static MODEL: Model = Model {
     reference: "Walter et al. 2007, eq. 20, 33, 34; Heitz 2014, eq. 85-87",
     has_fresnel: true,
     is_reciprocal: true,
-    // The interface alone does; an uncoupled Lambert term of albedo near 1 goes above.
+    // The interface alone stays below 1; an uncoupled Lambert term of albedo near 1 is added to it.
     largest_albedo: 2.0,
     parameters: &[
         DIFFUSE,

@@ -1,6 +1,13 @@
 //! GGX conductor: a rough metal, `f = k_s F D G / (4 cos θ_i cos θ_o)` with the exact Fresnel reflectance of a complex
 //! index per channel (Walter *et al.* 2007; Heitz 2014). No diffuse term.
 //!
+//! | parameter | meaning | default |
+//! |---|---|---|
+//! | `specular` | scale of the lobe; 1 is physical | 1 |
+//! | `eta`, `k` (`conductor` sets both) | complex index of refraction, per channel | iridium |
+//! | `roughness_u`, `roughness_v` (`roughness` sets both) | α along tangent and bitangent (not squared) | 0.2 |
+//! | `masking` | `separable` (Walter) or `correlated` (Heitz 2014) | separable |
+//!
 //! Known defect: light that bounces between microfacets is lost (up to a third at α = 1).
 
 use crate::distribution::Shape;

@@ -41,15 +41,17 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use crate::colour::{largest, mean};
 use crate::conformance::Parameters;
-use crate::distribution::{Distribution, Shape};
+use crate::distribution::Distribution;
 use crate::fresnel::{f0_from_ior, mix, schlick_weight};
+use crate::layers::{facets, ggx};
 use crate::masking::Masking;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::*;
 use crate::parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
 use crate::sampling::Technique;
-use crate::sheen::Charlie;
+use crate::sheen::{Charlie, Visibility};
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling};
 
 /// The description of the model.
@@ -65,7 +67,12 @@ pub static MODEL: Model = Model {
         BASE_COLOR,
         METALLIC,
         PERCEPTUAL_ROUGHNESS,
-        principled_ior("ior", "I", Interval::closed(0.0, 100.0)),
+        index(
+            ("ior", "I", Role::RefractiveIndex),
+            Range { valid: Interval::closed(0.0, 100.0), ..INDICES },
+            1.5,
+            "Index of refraction of the dielectric, inside over outside.",
+        ),
         unit_number(
             ("specular", "S", Role::SpecularReflectance),
             1.0,
@@ -116,9 +123,6 @@ const SPECULAR_COLOR: Parameter = Parameter {
     },
 };
 
-pub(super) const COAT_ROUGHNESS_SUMMARY: &str =
-    "Roughness of the clear coat; its square is the microfacet α.";
-
 /// F0 of the clear coat: an index of 1.5.
 const COAT_F0: f64 = 0.04;
 
@@ -158,7 +162,7 @@ impl Gltf {
         let sheen = (colour != [0.0; 3]).then(|| Sheen {
             colour,
             strength: largest(colour),
-            lobe: Charlie::new(v.number("sheen_roughness").powi(2)),
+            lobe: Charlie::new(v.number("sheen_roughness").powi(2), Visibility::Smith),
         });
         Self {
             sheen,
@@ -199,7 +203,7 @@ impl Gltf {
         let grazing = schlick_weight(g.cos_d);
         let [f0, f90] = self.dielectric.map(T::of);
         let diffuse = T::of(FRAC_1_PI) * (T::one() - mix(f0, f90, grazing));
-        let shape = microfacets(&self.distribution, self.masking, g);
+        let shape = facets(&self.distribution, self.masking, g);
         std::array::from_fn(|c| {
             T::of(self.body[c]) * diffuse + mix(T::of(self.f0[c]), T::of(self.f90), grazing) * shape
         })
@@ -219,7 +223,7 @@ impl Lobe for Gltf {
             f = std::array::from_fn(|c| T::of(sheen.colour[c]) * brdf + scale * f[c]);
         }
         if self.clearcoat > 0.0 {
-            let coat = microfacets(&self.coat, self.masking, g);
+            let coat = facets(&self.coat, self.masking, g);
             let reflected = T::of(self.clearcoat) * mix(T::of(COAT_F0), T::one(), schlick_weight(g.cos_o()));
             f = f.map(|base| mix(base, coat, reflected));
         }
@@ -249,21 +253,6 @@ impl Sheen {
 /// F0 of the dielectric: of the index, scaled and cut off.
 fn dielectric_f0(ior: f64, colour: [f64; 3], specular: f64) -> [f64; 3] {
     colour.map(|c| (f0_from_ior(ior) * c).min(1.0) * specular)
-}
-
-/// A GGX distribution no narrower than any surface's.
-pub(super) fn ggx(alpha: [f64; 2]) -> Distribution {
-    Distribution { shape: Shape::Ggx, alpha: alpha.map(|a| a.max(0.001)) }
-}
-
-/// A lobe of microfacets that reflect everything: `D G/(4 cos θ_i cos θ_o)`.
-#[inline(always)]
-pub(super) fn microfacets<T: Real>(distribution: &Distribution, masking: Masking, g: &Geometry<T>) -> T {
-    distribution.density(g) * masking.visibility(distribution, g) / (T::of(4.0) * g.cos_i() * g.cos_o())
-}
-
-pub(super) fn largest(colour: [f64; 3]) -> f64 {
-    colour.into_iter().fold(0.0, f64::max)
 }
 
 /// The BSDF of a conformance vector.

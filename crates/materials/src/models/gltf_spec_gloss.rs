@@ -17,7 +17,8 @@
 //! extension was written, not of the largest channel as in KHR_materials_specular. The defaults are those of an ordinary
 //! plastic; the format's own (1, 1, 1) mean a white mirror.
 //!
-//! Checked against the Khronos sample viewer's BRDF functions (`tests/vectors/make_shaders.py`).
+//! Checked: D, V and F against the Khronos sample viewer's BRDF functions (`tests/vectors/make_shaders.py`). How they are put together
+//! follows the text of the extension and is checked only by a second writing of it there, not independently.
 //!
 //! Known defects: `specular = 0` leaves the reflection at grazing half angles, and so does the material's diffuse part
 //! alone; white dielectrics reflect up to 1.3 times what arrives (glossiness 0.7, cos θ = 0.02), although the diffuse
@@ -25,11 +26,12 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use crate::colour::{largest, mean};
 use crate::distribution::Distribution;
 use crate::fresnel::{mix, schlick_weight};
+use crate::layers::{facets, ggx};
 use crate::masking::Masking;
 use crate::model::{Family, Model, Values};
-use crate::models::gltf::{ggx, largest, microfacets};
 use crate::models::shared::*;
 use crate::parameter::{Interval, Kind, Levels, Parameter, Range, Role, Scale};
 use crate::sampling::Technique;
@@ -125,7 +127,7 @@ impl Lobe for SpecularGlossiness {
     #[inline(always)]
     fn specular<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
         let grazing = schlick_weight(g.cos_d);
-        let shape = microfacets(&self.distribution, self.masking, g);
+        let shape = facets(&self.distribution, self.masking, g);
         std::array::from_fn(|c| {
             let reflectance = mix(T::of(self.f0[c]), T::one(), grazing);
             mix(T::of(self.body[c] * FRAC_1_PI), shape, reflectance)

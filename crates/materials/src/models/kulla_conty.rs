@@ -21,10 +21,10 @@
 use std::f64::consts::FRAC_1_PI;
 
 use crate::albedo::{Albedo, Interface};
+use crate::colour::mean;
 use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::Fresnel;
-use crate::layers::mean;
 use crate::masking::Masking;
 use crate::microfacet::Microfacet;
 use crate::model::{Model, Values};
@@ -41,7 +41,7 @@ pub static MODEL: Model = Model {
     reference: "Kulla & Conty 2017, Revisiting Physically Based Shading at Imageworks",
     has_fresnel: true,
     is_reciprocal: true,
-    // The lobe alone does; an uncoupled Lambert term of albedo near 1 goes above.
+    // The lobe alone stays below 1; an uncoupled Lambert term of albedo near 1 is added to it.
     largest_albedo: 2.0,
     parameters: &[
         DIFFUSE,

@@ -3,6 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
+use crate::colour::mean;
 use crate::distribution::{Distribution, Shape};
 use crate::{Geometry, Real, Sampling, Technique};
 
@@ -50,7 +51,6 @@ pub(super) fn lambert_below(measured: Measurement) -> [f64; 3] {
 /// A cosine and GGX lobes about as wide as the highlight of a measurement, in shares of the light that a Lambert term of albedo
 /// `lambert` and the rest reflect.
 pub(super) fn sampling(measured: Measurement, lambert: [f64; 3]) -> Option<Sampling> {
-    let mean = |v: [f64; 3]| (v[0] + v[1] + v[2]) / 3.0;
     let all = albedo(&|g| mean(measured(g)), 0.8);
     // The floor: what is wide is never left to the tails of narrow lobes.
     let diffuse = (mean(lambert) / all.max(f64::MIN_POSITIVE)).clamp(0.2, 1.0);

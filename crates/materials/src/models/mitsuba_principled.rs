@@ -31,13 +31,14 @@
 use std::f64::consts::FRAC_1_PI;
 
 use crate::burley;
+use crate::colour::mean;
 use crate::conformance::Parameters;
 use crate::distribution::{Distribution, Shape};
 use crate::fresnel::{Fresnel, f0_from_ior, mix, schlick_weight};
 use crate::masking::Masking;
 use crate::model::{Family, Model, Values};
 use crate::models::shared::*;
-use crate::parameter::{Interval, Role};
+use crate::parameter::Role;
 use crate::sampling::Technique;
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling};
 
@@ -54,7 +55,12 @@ pub static MODEL: Model = Model {
         PERCEPTUAL_ROUGHNESS,
         ANISOTROPIC,
         METALLIC,
-        principled_ior("eta", "η", Interval::closed(1.0, 100.0)),
+        index(
+            ("eta", "η", Role::RefractiveIndex),
+            INDICES,
+            1.5,
+            "Index of refraction of the dielectric, inside over outside.",
+        ),
         unit_number(("spec_tint", "T", Role::LobeShape), 0.0, "How far F0 takes the base colour's hue."),
         SHEEN,
         unit_number(("sheen_tint", "ST", Role::SheenShape), 0.0, SHEEN_TINT_SUMMARY),

@@ -39,14 +39,16 @@
 use std::array::from_fn;
 
 use crate::albedo::Albedo;
+use crate::colour::mean;
 use crate::conformance::Parameters;
-use crate::diffuse::Eon;
 use crate::distribution::Distribution;
-use crate::fresnel::{Fresnel, f0_from_ior};
+use crate::fresnel::{Fresnel, f0_from_ior, mix};
 use crate::fuzz::Fuzz;
-use crate::layers::{F82, Gloss, albedo, facets, ggx, lerp, mean};
+use crate::layers::{F82, Gloss, albedo, facets, ggx};
+use crate::masking::Masking;
 use crate::model::{Family, Model, Values};
-use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
+use crate::models::shared::*;
+use crate::oren_nayar::Eon;
 use crate::parameter::{Kind, Parameter, Role};
 use crate::physically_based;
 use crate::quadrature::Gauss;
@@ -94,8 +96,9 @@ pub static MODEL: Model = Model {
             0.0,
             "Stretch of the specular lobe along the tangent.",
         ),
-        layer_ior(
+        index(
             ("specular_ior", "n", Role::RefractiveIndex),
+            LAYER_INDICES,
             1.5,
             "Index of refraction of the dielectric.",
         ),
@@ -115,7 +118,7 @@ pub static MODEL: Model = Model {
             0.0,
             "Stretch of the coat's lobe along the tangent.",
         ),
-        layer_ior(("coat_ior", "n_c", Role::CoatIndex), 1.6, "Index of refraction of the coat."),
+        index(("coat_ior", "n_c", Role::CoatIndex), LAYER_INDICES, 1.6, "Index of refraction of the coat."),
         unit_number(
             ("coat_darkening", "δ", Role::CoatShape),
             1.0,
@@ -211,10 +214,10 @@ impl Openpbr {
         let (roughness, coat_roughness) = (number("specular_roughness"), number("coat_roughness"));
         let blurred = (roughness.powi(4) + 2.0 * coat_roughness.powi(4)).min(1.0).powf(0.25);
         let distribution =
-            spread(lerp(roughness, blurred, coat_weight), number("specular_roughness_anisotropy"));
+            spread(mix(roughness, blurred, coat_weight), number("specular_roughness_anisotropy"));
         let (weight, metalness) = (number("specular_weight"), number("base_metalness"));
         let ior = number("specular_ior");
-        let eta = modulated(lerp(ior, (ior / coat_ior).max(coat_ior / ior), coat_weight), weight);
+        let eta = modulated(mix(ior, (ior / coat_ior).max(coat_ior / ior), coat_weight), weight);
         let base_weight = number("base_weight");
         let rho = colour("base_color").map(|c| c * base_weight);
         let specular_color = colour("specular_color");
@@ -237,7 +240,7 @@ impl Openpbr {
             let coat_color = colour("coat_color");
             let average = 1.0 - (1.0 - average_reflectance(coat_ior)) / (coat_ior * coat_ior);
             // A diffuse body scatters everywhere; its interface and a metal, as far as they are rough.
-            let scattering = lerp(lerp(1.0, roughness, f0_from_ior(eta)), roughness, metalness);
+            let scattering = mix(mix(1.0, roughness, f0_from_ior(eta)), roughness, metalness);
             Coat {
                 weight: coat_weight,
                 gloss: Gloss::new(spread(coat_roughness, number("coat_roughness_anisotropy")), coat_ior),
@@ -245,7 +248,7 @@ impl Openpbr {
                 absorption: (coat_color != [1.0; 3]).then(|| coat_color.map(|c| 0.5 * c.ln())),
                 darkening: coat_weight * number("coat_darkening"),
                 inside: [average * scattering, 1.0 - scattering],
-                base: rho.map(|c| lerp(c, weight * c, metalness)),
+                base: rho.map(|c| mix(c, weight * c, metalness)),
             }
         });
         Self { lambert: [0.0; 3], base, coat, fuzz: None }
@@ -286,8 +289,11 @@ impl Base {
     fn at<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
         let one = T::one();
         let (gloss, metal) = (self.gloss.as_ref(), self.metal.as_ref());
-        let shape =
-            if gloss.is_some() || metal.is_some() { facets(&self.distribution, g) } else { T::zero() };
+        let shape = if gloss.is_some() || metal.is_some() {
+            facets(&self.distribution, Masking::Correlated, g)
+        } else {
+            T::zero()
+        };
         // (1 − E₁)/E₁, the light that a single reflection loses over that which it returns.
         let missing = self.white.as_ref().map_or(T::zero(), |white| white.at(&g.wo).recip() - one);
         let mut f = [T::zero(); 3];

@@ -31,7 +31,7 @@ pub static MODEL: Model = Model {
     summary: "Power of a cosine about the mirror direction, normalised, without Fresnel effect.",
     reference: "Phong 1975; Lafortune & Willems 1994; Mitsuba 0.6 phong",
     has_fresnel: false,
-    // The lobe alone does; an uncoupled Lambert term of albedo near 1 goes above.
+    // The lobe alone stays below 1; an uncoupled Lambert term of albedo near 1 is added to it.
     largest_albedo: 1.4,
     parameters: &[
         DIFFUSE,

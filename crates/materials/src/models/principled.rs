@@ -36,13 +36,15 @@
 use std::array::from_fn;
 
 use crate::albedo::Albedo;
-use crate::diffuse::Eon;
+use crate::colour::mean;
 use crate::distribution::Distribution;
-use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
+use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0, mix};
 use crate::fuzz::Fuzz;
-use crate::layers::{F82, albedo, facets, ggx, lerp, mean};
+use crate::layers::{F82, albedo, facets, ggx};
+use crate::masking::Masking;
 use crate::model::{Family, Model, Values};
-use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
+use crate::models::shared::*;
+use crate::oren_nayar::Eon;
 use crate::parameter::{Kind, Parameter, Role};
 use crate::{Geometry, Lobe, Real, Sampling, Technique};
 
@@ -55,7 +57,7 @@ pub static MODEL: Model = Model {
     family: Family::Production,
     has_fresnel: true,
     is_reciprocal: false,
-    // Isotropic lobes do.
+    // Isotropic lobes stay below 1.
     largest_albedo: 1.1,
     parameters: &[
         unit_colour(
@@ -69,7 +71,12 @@ pub static MODEL: Model = Model {
             0.5,
             "Roughness of the specular lobe; its square is α.",
         ),
-        layer_ior(("ior", "n", Role::RefractiveIndex), 1.5, "Index of refraction of the dielectric."),
+        index(
+            ("ior", "n", Role::RefractiveIndex),
+            LAYER_INDICES,
+            1.5,
+            "Index of refraction of the dielectric.",
+        ),
         unit_number(
             ("diffuse_roughness", "σ", Role::DiffuseRoughness),
             0.0,
@@ -96,7 +103,7 @@ pub static MODEL: Model = Model {
             0.03,
             "Roughness of the coat; its square is α.",
         ),
-        layer_ior(("coat_ior", "n_c", Role::CoatIndex), 1.5, "Index of refraction of the coat."),
+        index(("coat_ior", "n_c", Role::CoatIndex), LAYER_INDICES, 1.5, "Index of refraction of the coat."),
         unit_colour(
             ("coat_tint", "c_c", Role::CoatColour),
             [1.0; 3],
@@ -171,7 +178,7 @@ impl Dielectric {
         let tinted = tint.map(|t| f0 * t);
         // Kulla & Conty's fit of the average reflectance.
         let share = (((eta - 1.0) / (4.08567 + 1.00071 * eta) - f0) / (1.0 - f0)).clamp(0.0, 1.0);
-        let multiple = average.map(|average| tinted.map(|f0| repeated(lerp(f0, 1.0, share), average)));
+        let multiple = average.map(|average| tinted.map(|f0| repeated(mix(f0, 1.0, share), average)));
         Self { fresnel, albedo: albedo(&round(distribution), fresnel), f0, tinted, multiple }
     }
 
@@ -277,7 +284,7 @@ impl Coat {
         let (one, weight) = (T::one(), T::of(self.weight));
         let (lobe, albedo) = self.interface.as_ref().map_or((T::zero(), T::zero()), |interface| {
             let (lobe, albedo) = interface.at(g, self.white.at(&g.wo));
-            (lobe[0] * facets(&self.distribution, g), albedo)
+            (lobe[0] * facets(&self.distribution, Masking::Correlated, g), albedo)
         });
         let under = one - weight * albedo;
         let cos2_t = one - (one - g.cos_o() * g.cos_o()) * T::of(1.0 / (self.ior * self.ior));
@@ -310,7 +317,7 @@ impl Lobe for Principled {
             weight = from_fn(|c| weight[c] * under[c]);
         }
         let lobed = self.metal.is_some() || self.interface.is_some();
-        let shape = if lobed { facets(&self.distribution, g) } else { zero };
+        let shape = if lobed { facets(&self.distribution, Masking::Correlated, g) } else { zero };
         let white = self.white.as_ref().map_or(one, |(white, _)| white.at(&g.wo));
         if let Some((share, fresnel, multiple)) = &self.metal {
             let missing = (one - white) / white;

@@ -21,7 +21,7 @@
 //! | `coat`, `coat_color`, `coat_roughness`, `coat_anisotropy`, `coat_IOR`, `coat_affect_color`, `coat_affect_roughness` | clear coat | 0, 1, 0.1, 0, 1.5, 0, 0 |
 //!
 //! The layering and the parametrisation are those of MaterialX 1.39's graph (Oren–Nayar with its qualitative A and B; sheen below the specular lobe). The
-//! sheen is Conty & Kulla's (2017) distribution `(2 + 1/r) sin^(1/r) θ_h/(2π)` over `4 (cos θ_i + cos θ_o − cos θ_i cos θ_o)`, without masking.
+//! sheen is Estevez & Kulla's (2017) distribution `(2 + 1/r) sin^(1/r) θ_h/(2π)` over `4 (cos θ_i + cos θ_o − cos θ_i cos θ_o)`, without masking.
 //!
 //! Deviations: transmission, subsurface, thin film, emission and the rotations of tangents are left out; α is at least 0.001. The sheen's albedo is integrated
 //! where MaterialX fits it. Known defects: not reciprocal; light that bounces between microfacets is lost; the Oren–Nayar term loses energy; the sheen
@@ -32,17 +32,18 @@
 //! another language, whose fit of the albedo was 0.013 off there.
 
 use std::array::from_fn;
-use std::f64::consts::{FRAC_1_PI, PI, TAU};
-use std::sync::OnceLock;
 
+use crate::colour::mean;
 use crate::conformance::Parameters;
 use crate::distribution::Distribution;
-use crate::fresnel::Fresnel;
-use crate::layers::{Gloss, facets, ggx, lerp, mean};
+use crate::fresnel::{Fresnel, mix};
+use crate::layers::{Gloss, facets, ggx};
+use crate::masking::Masking;
 use crate::model::{Family, Model, Values};
-use crate::models::shared::{layer_ior, perceptual_roughness, unit_colour, unit_number};
+use crate::models::shared::*;
+use crate::oren_nayar::Qualitative;
 use crate::parameter::{Kind, Role};
-use crate::quadrature::{Gauss, chebyshev_coefficients, chebyshev_points, clenshaw};
+use crate::sheen::{Charlie, Visibility};
 use crate::{Bsdf, Geometry, Lobe, Real, Sampling, Technique};
 
 /// The description of the model.
@@ -54,7 +55,7 @@ pub static MODEL: Model = Model {
     family: Family::Production,
     has_fresnel: true,
     is_reciprocal: false,
-    // Without sheen it does.
+    // Without sheen it stays below 1.
     largest_albedo: 2.5,
     parameters: &[
         unit_number(("base", "w_b", Role::BaseWeight), 1.0, "Scale of the body's colour."),
@@ -84,8 +85,9 @@ pub static MODEL: Model = Model {
             0.2,
             "Roughness of the specular lobe; its square is α.",
         ),
-        layer_ior(
+        index(
             ("specular_IOR", "n", Role::RefractiveIndex),
+            LAYER_INDICES,
             1.5,
             "Index of refraction of the dielectric.",
         ),
@@ -113,7 +115,7 @@ pub static MODEL: Model = Model {
             0.0,
             "Stretch of the coat's lobe along the tangent.",
         ),
-        layer_ior(("coat_IOR", "n_c", Role::CoatIndex), 1.5, "Index of refraction of the coat."),
+        index(("coat_IOR", "n_c", Role::CoatIndex), LAYER_INDICES, 1.5, "Index of refraction of the coat."),
         unit_number(
             ("coat_affect_color", "-", Role::CoatShape),
             0.0,
@@ -130,8 +132,9 @@ pub static MODEL: Model = Model {
     build: |v: &Values| {
         let mut surface = StandardSurface::new(&|name| v.number(name), &|name| v.colour(name));
         let sheen = v.number("sheen");
-        surface.sheen = (sheen > 0.0)
-            .then(|| (sheen, v.colour("sheen_color"), Charlie::new(v.number("sheen_roughness"))));
+        surface.sheen = (sheen > 0.0).then(|| {
+            (sheen, v.colour("sheen_color"), Charlie::new(v.number("sheen_roughness"), Visibility::Neubelt))
+        });
         Box::new(surface.with_free_lambert())
     },
     vectors: Some(("standard_surface", vector)),
@@ -143,7 +146,8 @@ struct StandardSurface {
     /// Lambert's reflection, where nothing lies above it.
     lambert: [f64; 3],
     dielectric: f64,
-    diffuse: OrenNayar,
+    body: [f64; 3],
+    diffuse: Qualitative,
     /// Weight, colour and lobe.
     sheen: Option<(f64, [f64; 3], Charlie)>,
     distribution: Distribution,
@@ -161,7 +165,7 @@ impl StandardSurface {
     fn new(number: &dyn Fn(&str) -> f64, colour: &dyn Fn(&str) -> [f64; 3]) -> Self {
         let (coat, coat_roughness) = (number("coat"), number("coat_roughness"));
         let roughness =
-            lerp(number("specular_roughness"), 1.0, coat * number("coat_affect_roughness") * coat_roughness);
+            mix(number("specular_roughness"), 1.0, coat * number("coat_affect_roughness") * coat_roughness);
         let distribution = spread(roughness, number("specular_anisotropy"));
         let (base, base_color) = (number("base"), colour("base_color"));
         let (metalness, specular) = (number("metalness"), number("specular"));
@@ -174,22 +178,23 @@ impl StandardSurface {
         Self {
             lambert: [0.0; 3],
             dielectric: 1.0 - metalness,
-            diffuse: OrenNayar::new(base_color.map(|c| base * c.powf(gamma)), number("diffuse_roughness")),
+            body: base_color.map(|c| base * c.powf(gamma)),
+            diffuse: Qualitative::new(number("diffuse_roughness")),
             sheen: None,
             distribution,
             gloss: gloss.flatten().map(|gloss| (specular, gloss)),
             specular_color,
             metal: (metalness > 0.0).then_some((metalness, metal)),
             coat: (coat > 0.0).then(|| (coat, coat_gloss())),
-            filter: colour("coat_color").map(|c| lerp(1.0, c, coat)),
+            filter: colour("coat_color").map(|c| mix(1.0, c, coat)),
         }
     }
 
     /// Where nothing covers a smooth diffuse reflection, it is Lambert's term.
     fn with_free_lambert(mut self) -> Self {
         let uncovered = self.gloss.is_none() && self.sheen.is_none() && self.coat.is_none();
-        if uncovered && self.diffuse.b == 0.0 {
-            self.lambert = self.diffuse.colour.map(|c| c * self.dielectric);
+        if uncovered && self.diffuse.is_smooth() {
+            self.lambert = self.body.map(|c| c * self.dielectric);
             self.dielectric = 0.0;
         }
         self
@@ -206,85 +211,9 @@ fn spread(roughness: f64, anisotropy: f64) -> Distribution {
 /// The complex index of a metal of a reflectance at normal incidence and a tint of its edges (Gulbrandsen 2014).
 fn artistic_metal(reflectance: f64, edge: f64) -> Fresnel {
     let r = reflectance.clamp(0.0, 0.99);
-    let eta = lerp((1.0 + r.sqrt()) / (1.0 - r.sqrt()), (1.0 - r) / (1.0 + r), edge);
+    let eta = mix((1.0 + r.sqrt()) / (1.0 - r.sqrt()), (1.0 - r) / (1.0 + r), edge);
     let k2 = ((eta + 1.0).powi(2) * r - (eta - 1.0).powi(2)) / (1.0 - r);
     Fresnel::Conductor { eta, k: k2.max(0.0).sqrt() }
-}
-
-/// Oren & Nayar's qualitative model (1994, eq. 30).
-struct OrenNayar {
-    colour: [f64; 3],
-    a: f64,
-    b: f64,
-}
-
-impl OrenNayar {
-    fn new(colour: [f64; 3], sigma: f64) -> Self {
-        let sigma2 = sigma * sigma;
-        Self { colour, a: 1.0 - 0.5 * sigma2 / (sigma2 + 0.33), b: 0.45 * sigma2 / (sigma2 + 0.09) }
-    }
-
-    /// The BRDF over its colour.
-    #[inline(always)]
-    fn at<T: Real>(&self, g: &Geometry<T>) -> T {
-        let s = (g.wi[0] * g.wo[0] + g.wi[1] * g.wo[1]).max(T::zero());
-        T::of(FRAC_1_PI * self.a) + T::of(FRAC_1_PI * self.b) * s / g.cos_i().max(g.cos_o())
-    }
-}
-
-/// Conty & Kulla's sheen.
-struct Charlie {
-    /// Half the power of the sine, and the scale of the distribution.
-    half_power: f64,
-    scale: f64,
-    /// Chebyshev coefficients of the albedo over the cosine.
-    albedo: OnceLock<Vec<f64>>,
-}
-
-impl Charlie {
-    fn new(roughness: f64) -> Self {
-        let power = 1.0 / roughness.max(0.005);
-        Self { half_power: 0.5 * power, scale: (2.0 + power) / (8.0 * PI), albedo: OnceLock::new() }
-    }
-
-    #[inline(always)]
-    fn at<T: Real>(&self, g: &Geometry<T>) -> T {
-        let tan2 = g.tan2_h[0] + g.tan2_h[1];
-        let sin2 = tan2 / (T::one() + tan2);
-        let (ci, co) = (g.cos_i(), g.cos_o());
-        T::of(self.scale) * sin2.powf(T::of(self.half_power)) / (ci + co - ci * co)
-    }
-
-    /// Directional albedo of a view direction, 1 at most.
-    #[inline(always)]
-    fn albedo<T: Real>(&self, cos_o: T) -> T {
-        let coefficients = self.albedo.get_or_init(|| self.interpolated());
-        clenshaw(coefficients, T::of(2.0) * cos_o.sqrt() - T::one()).max(T::zero()).min(T::one())
-    }
-
-    /// The albedo as a polynomial of the cosine's square root.
-    fn interpolated(&self) -> Vec<f64> {
-        let gauss = Gauss::new(40);
-        let value = |u: f64| {
-            let mu = (0.5 * (u + 1.0)).powi(2);
-            let wo = [(1.0 - mu * mu).sqrt(), 0.0, mu];
-            // Grazing light and retroreflection matter most: squares put nodes there.
-            gauss
-                .on(0.0, 1.0)
-                .map(|(x, weight)| {
-                    let (cos, sin) = (x * x, (1.0 - x.powi(4)).sqrt());
-                    let ring = gauss.on(0.0, 1.0).map(|(y, weight)| {
-                        let (sin_phi, cos_phi) = (PI * y * y).sin_cos();
-                        let f = Geometry::new([sin * cos_phi, sin * sin_phi, cos], wo)
-                            .map_or(0.0, |g| self.at(&g));
-                        2.0 * y * weight * f
-                    });
-                    TAU * cos * 2.0 * x * weight * ring.sum::<f64>()
-                })
-                .sum()
-        };
-        chebyshev_coefficients(&chebyshev_points(24).map(value).collect::<Vec<f64>>())
-    }
 }
 
 impl Lobe for StandardSurface {
@@ -296,14 +225,15 @@ impl Lobe for StandardSurface {
     fn specular<T: Real>(&self, g: &Geometry<T>) -> [T; 3] {
         let (zero, one) = (T::zero(), T::one());
         let lobed = self.gloss.is_some() || self.metal.is_some();
-        let shape = if lobed { facets(&self.distribution, g) } else { zero };
+        let shape = if lobed { facets(&self.distribution, Masking::Correlated, g) } else { zero };
         let mut f = [zero; 3];
         if self.dielectric > 0.0 {
             let diffuse = self.diffuse.at(g);
-            f = self.diffuse.colour.map(|c| T::of(c) * diffuse);
+            f = self.body.map(|c| T::of(c) * diffuse);
             if let Some((weight, colour, charlie)) = &self.sheen {
                 let weight = T::of(*weight);
-                let (lobe, under) = (weight * charlie.at(g), one - weight * charlie.albedo(g.cos_o()));
+                let (lobe, under) =
+                    (weight * charlie.brdf(g), one - weight * charlie.directional_albedo(g.cos_o()));
                 f = from_fn(|c| T::of(colour[c]) * lobe + under * f[c]);
             }
             if let Some((weight, gloss)) = &self.gloss {
@@ -344,7 +274,7 @@ impl Lobe for StandardSurface {
         });
         let below = [
             (specular, Technique::HalfVector(self.distribution)),
-            (self.dielectric * (mean(self.diffuse.colour) + sheen), Technique::Cosine),
+            (self.dielectric * (mean(self.body) + sheen), Technique::Cosine),
         ];
         Sampling::mixture(below.into_iter().chain(coat))
     }

@@ -43,12 +43,13 @@
 
 use std::f64::consts::PI;
 
+use crate::colour::mean;
 use crate::distribution::Distribution;
 use crate::fresnel::{f0_from_ior, mix, schlick_weight};
+use crate::layers::ggx;
 use crate::model::{Family, Model, Values};
-use crate::models::gltf::{COAT_ROUGHNESS_SUMMARY, ggx};
 use crate::models::shared::*;
-use crate::parameter::{Interval, Kind, Parameter, Role};
+use crate::parameter::{Kind, Parameter, Role};
 use crate::sampling::Technique;
 use crate::{Geometry, Lobe, Real, Sampling};
 
@@ -83,7 +84,12 @@ pub static MODEL: Model = Model {
         PERCEPTUAL_ROUGHNESS,
         unit_number(("clearcoat", "CC", Role::Coat), 0.0, "Weight of the second lobe."),
         unit_number(("clearcoat_roughness", "CR", Role::CoatRoughness), 0.01, COAT_ROUGHNESS_SUMMARY),
-        principled_ior("ior", "I", Interval::closed(1.0, 100.0)),
+        index(
+            ("ior", "I", Role::RefractiveIndex),
+            INDICES,
+            1.5,
+            "Index of refraction of the dielectric, inside over outside.",
+        ),
         Parameter {
             name: "variant",
             symbol: "-",

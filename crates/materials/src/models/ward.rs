@@ -8,6 +8,13 @@
 //! | `duer` | `k_s E / (4π α_u α_v cos θ_i cos θ_o)` | Dür 2006 |
 //! | `ward` | `k_s E / (4π α_u α_v √(cos θ_i cos θ_o))` | Ward 1992, eq. 4 |
 //!
+//! | parameter | meaning | default |
+//! |---|---|---|
+//! | `diffuse` | albedo of the Lambert term | 0.5 |
+//! | `specular` | scale of the lobe, k_s | 0.1 |
+//! | `roughness_u`, `roughness_v` (`roughness` sets both) | α along tangent and bitangent (not squared) | 0.2 |
+//! | `variant` | normalisation | gmd |
+//!
 //! Presets: `ngan-NAME` (variant `ward`) and `ngan-duer-NAME` (variant `duer`), fits of MERL materials by Ngan *et al.* (2005).
 //!
 //! Known defects: no Fresnel effect. `ward` loses and `duer` creates energy towards grazing angles (a directional albedo
