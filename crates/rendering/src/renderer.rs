@@ -1,6 +1,5 @@
 //! The built-in renderer: a scene prepared for one illumination, and pictures of materials in it.
 
-use std::f32::consts::PI;
 use std::io;
 use std::sync::LazyLock;
 
@@ -12,18 +11,17 @@ use crate::bodies::Body;
 use crate::bounce::{Bounce, MODES, Weights};
 use crate::cache::{Observe, Progress, TransportCache};
 use crate::field::Field;
-use crate::film::{Film, SUBSAMPLES, SurfacePoint};
+use crate::film::{Film, SUBSAMPLES};
 use crate::flat::{Flat, Reader, Writer};
 use crate::gather;
 use crate::highlights::Highlights;
-use crate::irradiance::Place;
 use crate::lobes::{Expanded, Lobes, SplitLobes};
-use crate::returned::{Returned, ReturnedLight};
+use crate::returned::{DiffuseLight, Returned};
 use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
 use crate::source::Source;
 use crate::transport::{Lobe, Planes, Transport};
-use crate::{Rgb, SceneError, rgb};
+use crate::{Rgb, SceneError};
 
 #[cfg(test)]
 mod accuracy;
@@ -75,20 +73,6 @@ pub struct Renderer {
     mask: Mask,
 }
 
-/// Light that leaves a subject pixel diffusely.
-#[derive(Clone, Copy, Debug, Default)]
-struct DiffuseLight {
-    /// From spheres with a colour of their own.
-    own: Rgb,
-    /// From the others, for an albedo of 1.
-    white: Rgb,
-    /// Share of the pixel that they cover, by colour of their own and without one.
-    own_share: Rgb,
-    white_share: f32,
-    /// For an albedo of 1, of an irradiance of the checkerboard in each mode of the interreflection.
-    modes: [f32; MODES],
-}
-
 impl Renderer {
     /// Prepares a scene for pictures of `size` × `size` pixels (1 to 8192).
     ///
@@ -134,7 +118,7 @@ impl Renderer {
         let bounce = Bounce::prepare(scene, &field);
         let diffuse: Vec<DiffuseLight> = subjects
             .par_iter()
-            .map(|p| diffuse_light(scene, &field, &film, bounce.as_ref(), *p as usize))
+            .map(|pixel| DiffuseLight::of_pixel(scene, &field, &film, bounce.as_ref(), *pixel as usize))
             .collect();
         let board = bounce.as_ref().map_or(Vec::new(), |bounce| seen_modes(&field, &film, bounce));
         let highlights = Highlights::prepare(&field, &film, &subjects);
@@ -145,7 +129,7 @@ impl Renderer {
             background,
             subjects,
             rows,
-            returned: returned(&diffuse),
+            returned: Returned::new(&diffuse),
             bounce,
             board,
             highlights,
@@ -377,18 +361,6 @@ fn difference(a: &Weights, b: &Weights) -> Weights {
     std::array::from_fn(|m| std::array::from_fn(|c| a[m][c] - b[m][c]))
 }
 
-/// What the diffuse term reflects of irradiance on the checkerboard.
-fn returned(diffuse: &[DiffuseLight]) -> Returned {
-    let rgb = |v: Rgb| [v.x, v.y, v.z];
-    Returned::new(diffuse.iter().map(|d| ReturnedLight {
-        own: rgb(d.own),
-        white: rgb(d.white),
-        own_share: rgb(d.own_share),
-        white_share: d.white_share,
-        modes: d.modes,
-    }))
-}
-
 /// What pixels see of the checkerboard for an irradiance in each mode.
 fn seen_modes(field: &Field, film: &Film, bounce: &Bounce) -> Vec<(u32, [f32; MODES])> {
     let pixel = |pixel: u32| {
@@ -417,42 +389,6 @@ fn look(field: &Field, film: &Film) -> (Vec<Rgb>, Vec<bool>) {
         (sum / count as f32, !points.is_empty())
     };
     (0..film.size * film.size).into_par_iter().map(pixel).unzip()
-}
-
-/// Diffuse light of one pixel. Point lights have hard shadows and are evaluated at each sub-pixel sample; the rest is
-/// smooth and evaluated once per sphere, at the mean of its samples.
-fn diffuse_light(
-    scene: &Scene,
-    field: &Field,
-    film: &Film,
-    bounce: Option<&Bounce>,
-    pixel: usize,
-) -> DiffuseLight {
-    let (points, count) = film.points(&field.bodies, pixel);
-    let mut light = DiffuseLight::default();
-    for (sphere, description) in scene.spheres.iter().enumerate() {
-        let here: Vec<&SurfacePoint> = points.iter().filter(|p| p.sphere == sphere).collect();
-        let Some(first) = here.first() else { continue };
-        let normal = here.iter().map(|p| p.place.normal).sum::<glam::DVec3>().normalize();
-        let mean = Place { position: field.bodies.point(sphere, normal), normal, body: first.place.body };
-        let sharp: Rgb = here.iter().map(|p| field.point_irradiance(&p.place)).sum();
-        let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
-        let radiance = irradiance / (count as f32 * PI);
-        let share = here.len() as f32 / count as f32;
-        match description.diffuse {
-            Some(own) => {
-                (light.own, light.own_share) =
-                    (light.own + rgb(own) * radiance, light.own_share + rgb(own) * share)
-            }
-            None => (light.white, light.white_share) = (light.white + radiance, light.white_share + share),
-        }
-        if let Some(bounce) = bounce {
-            // Where several spheres share a pixel, the last one's light stands for all.
-            let tinted = bounce.irradiance(sphere, normal);
-            light.modes = tinted.map(|e| e / PI);
-        }
-    }
-    light
 }
 
 /// The radial mask of every sphere.
