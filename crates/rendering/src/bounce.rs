@@ -28,7 +28,7 @@ use crate::grid::Grid;
 use crate::irradiance::Place;
 use crate::lobe_table::LobeTable;
 use crate::pyramid::Pyramid;
-use crate::rings::{NODES, Ring, TERMS, chebyshev, hat_position};
+use crate::rings::{NODES, TERMS};
 use crate::rows::View;
 use crate::sampling::{cosine_direction, frame, zero_two};
 use crate::scene::Scene;
@@ -671,19 +671,13 @@ impl Light {
             return;
         }
         let view = View::new(SurfacePoint { place, sphere, wo });
-        let h = (to_source.normalize() + wo).normalize();
-        let cos_h = h.dot(place.normal).min(1.0);
-        let sin_h = (1.0 - cos_h * cos_h).sqrt().max(1e-9);
-        let Some(ring) = Ring::new((view.cosine, view.sine), (cos_h, sin_h)) else { return };
-        let cos_d = wo.dot(h);
-        // The solid angle of the area, projected; and the light as a moment: see `transport::add_lamps`.
+        let Some(at) = view.ring_point(to_source.normalize()) else { return };
+        // The solid angle of the area, projected, times the light's irradiance there.
         let projected = -wo.y * cos_o * area / to_point.length_squared();
-        let share = projected / (4.0 * cos_d * sin_h * to_source.length_squared());
-        let (interval, hat) = hat_position(sin_h.atan2(cos_h));
-        let polynomials = chebyshev(ring.position(cos_d));
+        let share = projected / (at.density * to_source.length_squared());
         for (angle, part) in angle_position(view.angle()) {
-            for (node, hat) in [(interval, 1.0 - hat), (interval + 1, hat)] {
-                for (k, polynomial) in polynomials.iter().take(FUNCTION_TERMS).enumerate() {
+            for (node, hat) in at.hats {
+                for (k, polynomial) in at.polynomials.iter().take(FUNCTION_TERMS).enumerate() {
                     let value = (share * part * hat * polynomial) as f32;
                     let place = angle * ROW + node * FUNCTION_TERMS + k;
                     (0..3).for_each(|c| light.specular[c * LOBE + place] += value * intensity[c]);
