@@ -327,7 +327,8 @@ impl Renderer {
         let film = Film::new(&source.scene.camera, source.size);
         let mask = subject_mask(&source.scene, &film).map_err(io::Error::other)?;
         let source = source.clone();
-        let bake = move || source.bake_apart().expect("the light was baked before it was kept");
+        // The file of the map may be gone by now: its content was read with the source, and baked before under the same key.
+        let bake = move || source.bake_apart().expect("the same content was baked before");
         Ok(Self {
             field: LazyLock::new(Box::new(bake)),
             film,
