@@ -11,7 +11,7 @@ use crate::bodies::Body;
 use crate::bounce::{Bounce, MODES, Weights};
 use crate::cache::{Observe, Progress, TransportCache};
 use crate::field::Field;
-use crate::film::{Film, SUBSAMPLES};
+use crate::film::Film;
 use crate::flat::{Flat, Reader, Writer};
 use crate::gather;
 use crate::highlights::Highlights;
@@ -365,11 +365,13 @@ fn difference(a: &Weights, b: &Weights) -> Weights {
 /// What pixels see of the checkerboard for an irradiance in each mode.
 fn seen_modes(field: &Field, film: &Film, bounce: &Bounce) -> Vec<(u32, [f32; MODES])> {
     let pixel = |pixel: u32| {
+        // As many positions as what lies before the checkerboard is seen through.
+        let (_, count) = film.points(&field.bodies, pixel as usize);
         let mut sums = [0.0; MODES];
-        for direction in film.directions(pixel as usize, SUBSAMPLES) {
+        for direction in film.directions(pixel as usize, count) {
             if let Some((u, v, brightness)) = field.board_from(film.eye, direction) {
                 let values = bounce.modes.at(u, v);
-                (0..MODES).for_each(|m| sums[m] += brightness * values[m] / SUBSAMPLES as f32);
+                (0..MODES).for_each(|m| sums[m] += brightness * values[m] / count as f32);
             }
         }
         (sums != [0.0; MODES]).then_some((pixel, sums))

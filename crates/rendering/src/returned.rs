@@ -23,11 +23,9 @@ pub(crate) struct DiffuseLight {
     own: Rgb,
     /// From the others, for an albedo of 1.
     white: Rgb,
-    /// Share of the pixel that they cover, by colour of their own and without one.
-    own_share: Rgb,
-    white_share: f32,
-    /// For an albedo of 1, of an irradiance of the checkerboard in each mode of the interreflection.
-    modes: [f32; MODES],
+    /// Of an irradiance of the checkerboard in each mode of the interreflection: by spheres with a colour of their own, for
+    /// each channel, then by the others, for an albedo of 1.
+    modes: [[f32; MODES]; 4],
 }
 
 impl DiffuseLight {
@@ -51,28 +49,35 @@ impl DiffuseLight {
             let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
             let radiance = irradiance / (count as f32 * PI);
             let share = here.len() as f32 / count as f32;
-            match description.diffuse {
+            let colour = match description.diffuse {
                 Some(own) => {
-                    (light.own, light.own_share) =
-                        (light.own + rgb(own) * radiance, light.own_share + rgb(own) * share)
+                    light.own += rgb(own) * radiance;
+                    rgb(own)
                 }
                 None => {
-                    (light.white, light.white_share) = (light.white + radiance, light.white_share + share)
+                    light.white += radiance;
+                    Rgb::W
                 }
-            }
+            };
             if let Some(bounce) = bounce {
-                // Where several spheres share a pixel, the last one's light stands for all.
-                let tinted = bounce.irradiance(sphere, normal);
-                light.modes = tinted.map(|e| e / PI);
+                light.add_modes(colour * share, bounce.irradiance(sphere, normal));
             }
         }
         light
+    }
+
+    /// Adds what a sphere reflects of irradiance in each mode; its albedo times its share of the pixel, for channels and for
+    /// an albedo of 1.
+    fn add_modes(&mut self, share: Rgb, irradiance: [f32; MODES]) {
+        for (modes, share) in self.modes.iter_mut().zip(share.to_array()) {
+            modes.iter_mut().zip(irradiance).for_each(|(mode, e)| *mode += share * (e / PI));
+        }
     }
 }
 
 /// All subject pixels, number by number.
 pub(crate) struct Returned {
-    /// Modes times shares: of spheres with a colour of their own by channel, then of the others.
+    /// [`DiffuseLight::modes`]
     planes: [[Vec<f32>; MODES]; 4],
     own: Planes,
     white: Planes,
@@ -82,16 +87,8 @@ pub(crate) struct Returned {
 impl Returned {
     pub(crate) fn new(lights: &[DiffuseLight]) -> Self {
         let plane = |value: &dyn Fn(&DiffuseLight) -> f32| -> Vec<f32> { lights.iter().map(value).collect() };
-        let modes = |share: &dyn Fn(&DiffuseLight) -> f32| {
-            std::array::from_fn(|m| plane(&|light| share(light) * light.modes[m]))
-        };
         Self::of(
-            [
-                modes(&|light| light.own_share.x),
-                modes(&|light| light.own_share.y),
-                modes(&|light| light.own_share.z),
-                modes(&|light| light.white_share),
-            ],
+            std::array::from_fn(|share| std::array::from_fn(|m| plane(&|light| light.modes[share][m]))),
             std::array::from_fn(|c| plane(&|light| light.own[c])),
             std::array::from_fn(|c| plane(&|light| light.white[c])),
         )

@@ -131,3 +131,21 @@ fn a_turned_map_turns_what_is_seen_of_it() {
     assert!(at(0.0) == at(360.0));
     assert!(at(0.0) != at(90.0));
 }
+
+#[test]
+fn the_order_of_spheres_does_not_matter() {
+    let mut scene = Scene::reference();
+    // Behind the first, and partly hidden by it.
+    let mut other = scene.spheres[0].clone();
+    (other.centre, other.radius) = ([0.9, -0.2, -2.0], 0.8);
+    scene.spheres.push(other);
+    let picture = |scene: &Scene| {
+        let renderer = Renderer::prepare(scene, Illumination::Environment, 48).unwrap();
+        renderer.render(&material("lambert:diffuse=0.9"), Part::Full)
+    };
+    let ab = picture(&scene);
+    scene.spheres.reverse();
+    let ba = picture(&scene);
+    let difference = bend(&ab, &ba, &ab);
+    assert!(difference < 1e-4, "{difference}");
+}
