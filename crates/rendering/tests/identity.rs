@@ -149,3 +149,19 @@ fn the_order_of_spheres_does_not_matter() {
     let difference = bend(&ab, &ba, &ab);
     assert!(difference < 1e-4, "{difference}");
 }
+
+#[test]
+fn sunken_spheres_give_finite_pictures() {
+    // The middle of the checkerboard is a node of the grid of interreflection.
+    for height in [-0.7, -1.0, -1.5] {
+        let mut scene = Scene::reference();
+        scene.spheres[0].centre[1] = height;
+        let renderer = Renderer::prepare(&scene, Illumination::All, 16).unwrap();
+        for text in ["ggx-conductor:roughness=0.1", "lambert:diffuse=0.8"] {
+            let picture = renderer.render(&material(text), Part::Full);
+            assert!(picture.pixels().iter().flatten().all(|v| v.is_finite()), "{height} {text}");
+            let sum: f32 = picture.pixels().iter().flatten().sum();
+            assert!(sum > 0.0, "{height} {text}");
+        }
+    }
+}
