@@ -168,7 +168,7 @@ impl Renderer {
         let lobes = Lobes::new(materials.iter().map(bsdf).collect());
         let planes = self.subject_planes(&lobes);
         let materials = lobes.bsdfs.iter().zip(&lobes.expanded);
-        let weights = materials.map(|(bsdf, expanded)| self.weights(&**bsdf, expanded.as_ref()));
+        let weights = materials.map(|(bsdf, expanded)| self.weights(&**bsdf, expanded.as_deref()));
         planes.iter().zip(weights).map(|(planes, weights)| self.developed(planes, &weights)).collect()
     }
 
@@ -216,9 +216,7 @@ impl Renderer {
         let mut diffuse = self.subject_planes(&lobes.diffuse);
         let mut specular = self.planes(&lobes.whole, &|material| !lobes.is_plain[material]);
         specular.par_iter_mut().enumerate().filter(|(k, _)| !lobes.is_plain[*k]).for_each(|(k, planes)| {
-            for (plane, diffuse) in planes.iter_mut().zip(&diffuse[lobes.diffuse_of[k]]) {
-                plane.iter_mut().zip(diffuse).for_each(|(whole, diffuse)| *whole -= diffuse);
-            }
+            subtract(planes, &diffuse[lobes.diffuse_place(k)]);
         });
         diffuse.par_iter_mut().for_each(|planes| self.add_background(planes));
         SplitPlanes { specular, diffuse }
@@ -238,29 +236,30 @@ impl Renderer {
     }
 
     /// The planes of some materials: everything, or only what the lobes add to the Lambert term.
-    fn planes(&self, lobes: &Lobes, whole: &(dyn Fn(usize) -> bool + Sync)) -> Vec<Planes> {
+    fn planes(&self, lobes: &Lobes, is_whole: &(dyn Fn(usize) -> bool + Sync)) -> Vec<Planes> {
         let materials = lobes.bsdfs.par_iter().zip(&lobes.expanded);
         let waiting: Vec<Option<Lobe>> =
-            materials.map(|(bsdf, expanded)| Some(self.lobe(&**bsdf, expanded.as_ref()?))).collect();
+            materials.map(|(bsdf, expanded)| Some(self.lobe(&**bsdf, expanded.as_deref()?))).collect();
         let mut lit = self.lit(&waiting.iter().flatten().collect::<Vec<_>>()).into_iter();
         let lit: Vec<Option<(&Lobe, Planes)>> =
             waiting.iter().map(|lobe| lobe.as_ref().and_then(|lobe| Some((lobe, lit.next()?)))).collect();
-        let finished = |(k, (bsdf, lit)): (usize, (&Box<dyn Bsdf>, _))| self.finished(&**bsdf, lit, whole(k));
+        let finished =
+            |(k, (bsdf, lit)): (usize, (&Box<dyn Bsdf>, _))| self.finished(&**bsdf, lit, is_whole(k));
         lobes.bsdfs.par_iter().zip(lit).enumerate().map(finished).collect()
     }
 
     /// What the rings made of a lobe, with all that they do not hold.
-    fn finished(&self, bsdf: &dyn Bsdf, lit: Option<(&Lobe, Planes)>, whole: bool) -> Planes {
+    fn finished(&self, bsdf: &dyn Bsdf, lit: Option<(&Lobe, Planes)>, is_whole: bool) -> Planes {
         let without = self.weights(bsdf, None);
         let (mut planes, weights) = match lit {
             Some((lobe, mut image)) => {
                 self.add_lights(bsdf, &mut image);
-                (image, if whole { lobe.weights } else { difference(&lobe.weights, &without) })
+                (image, if is_whole { lobe.weights } else { difference(&lobe.weights, &without) })
             }
-            None if whole => (self.black(), without),
+            None if is_whole => (self.black(), without),
             None => return self.black(),
         };
-        if whole {
+        if is_whole {
             self.returned.add_baked(bsdf.diffuse(), &mut planes);
         }
         self.returned.add(&weights, bsdf.diffuse(), &mut planes);
@@ -355,6 +354,12 @@ impl Scene {
             scene.meshes.iter_mut().for_each(|m| m.diffuse = None);
         }
         scene
+    }
+}
+
+fn subtract(planes: &mut Planes, others: &Planes) {
+    for (plane, other) in planes.iter_mut().zip(others) {
+        plane.iter_mut().zip(other).for_each(|(value, other)| *value -= other);
     }
 }
 
