@@ -41,7 +41,7 @@ impl LobeTable {
         let lobe = if !bsdf.is_isotropic() {
             averaged(bsdf, &quadrature.geometries, (0..TURNS).map(|k| move |g: &Geometry<f32>| turned(g, k)))
         } else if !bsdf.is_mirror_symmetric() {
-            let both: [fn(&Geometry<f32>) -> Geometry<f32>; 2] = [|g| *g, |g| g.mirrored()];
+            let both: [Motion; 2] = [|g| *g, |g| g.mirrored()];
             averaged(bsdf, &quadrature.geometries, both.into_iter())
         } else {
             bsdf.specular_all(&quadrature.geometries)
@@ -106,6 +106,9 @@ fn blend<S: Simd>(simd: S, rows: &[Coefficients], weights: [f32; 4], out: &mut [
 }
 
 const _: () = assert!((3 * ROW).is_multiple_of(16), "rows fill the registers of every instruction set");
+
+/// What a reflection is moved by.
+type Motion = fn(&Geometry<f32>) -> Geometry<f32>;
 
 /// Turns about the normal that an anisotropic lobe is averaged over.
 const TURNS: usize = 8;

@@ -72,11 +72,11 @@ impl SplitLobes {
             (bsdf, expanded, key)
         };
         let lobes: Vec<_> = firsts.par_iter().map(lobe).collect();
-        let plain = |(whole, kind): (&Box<dyn Bsdf>, &usize)| {
-            let (bsdf, expanded, _) = &lobes[*kind];
-            expanded.is_none() && bsdf.diffuse() == whole.diffuse()
+        let plain = |k: usize| {
+            let (bsdf, expanded, _) = &lobes[kind_of[k]];
+            expanded.is_none() && bsdf.diffuse() == whole.bsdfs[k].diffuse()
         };
-        let is_plain = whole.bsdfs.iter().zip(&kind_of).map(plain).collect();
+        let is_plain = (0..materials.len()).map(plain).collect();
         // Materials of different models can have the same diffuse reflection.
         let (firsts, place_of_kind) = kinds(lobes.iter().map(|(_, _, key)| *key));
         let place_of = kind_of.iter().map(|kind| place_of_kind[*kind]).collect();

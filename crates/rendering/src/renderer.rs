@@ -243,9 +243,8 @@ impl Renderer {
         let mut lit = self.lit(&waiting.iter().flatten().collect::<Vec<_>>()).into_iter();
         let lit: Vec<Option<(&Lobe, Planes)>> =
             waiting.iter().map(|lobe| lobe.as_ref().and_then(|lobe| Some((lobe, lit.next()?)))).collect();
-        let finished =
-            |(k, (bsdf, lit)): (usize, (&Box<dyn Bsdf>, _))| self.finished(&**bsdf, lit, is_whole(k));
-        lobes.bsdfs.par_iter().zip(lit).enumerate().map(finished).collect()
+        let materials = lobes.bsdfs.par_iter().zip(lit).enumerate();
+        materials.map(|(k, (bsdf, lit))| self.finished(&**bsdf, lit, is_whole(k))).collect()
     }
 
     /// What the rings made of a lobe, with all that they do not hold.
