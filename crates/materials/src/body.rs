@@ -6,6 +6,16 @@
 
 use crate::{Bsdf, Geometry, Material, Role, Sampling, Technique, Value};
 
+/// A dielectric with its body's colour and with a black one: the diffuse reflection is a share of their difference.
+pub struct BlackBody {
+    /// The material without its metal.
+    pub coloured: Material,
+    /// The same with a black body.
+    pub black: Material,
+    /// What is not metal, 0 to 1.
+    pub share: f64,
+}
+
 /// A material's body: `share (f_coloured − f_black)`.
 struct Body {
     coloured: Box<dyn Bsdf>,
@@ -66,20 +76,24 @@ impl Material {
         if let Some(separate) = self.model().diffuse_only {
             return separate(&self.as_values());
         }
-        let Some(body) = self.model().parameters.iter().position(|p| p.role.is_body()) else {
-            return lambert([0.0; 3]);
-        };
-        // Nothing couples such a term to what is above it.
-        if self.model().parameters[body].role == Role::DiffuseReflectance {
-            return lambert(self.bsdf().diffuse());
+        if let Some(BlackBody { coloured, black, share }) = self.black_body() {
+            return Box::new(Body { coloured: coloured.bsdf(), black: black.bsdf(), share });
         }
+        // Nothing couples such a term to what is above it.
+        let is_lambert = self.by_role(Role::DiffuseReflectance).is_some();
+        lambert(if is_lambert { self.bsdf().diffuse() } else { [0.0; 3] })
+    }
+
+    /// What tells its diffuse reflection from the rest; `None` where that is a Lambert term of its own, or nothing.
+    pub fn black_body(&self) -> Option<BlackBody> {
+        let has_own = self.model().diffuse_only.is_some() || self.by_role(Role::DiffuseReflectance).is_some();
         let metalness = self.by_role(Role::Metalness).and_then(|m| m.mean()).unwrap_or(0.0);
-        if metalness == 1.0 {
-            return lambert([0.0; 3]);
+        if has_own || self.by_role(Role::BaseColour).is_none() || metalness == 1.0 {
+            return None;
         }
         let coloured = self.with_role(Role::Metalness, &Value::Number(0.0));
         let black = coloured.with_role(Role::BaseColour, &Value::Colour([0.0; 3]));
-        Box::new(Body { coloured: coloured.bsdf(), black: black.bsdf(), share: 1.0 - metalness })
+        Some(BlackBody { coloured, black, share: 1.0 - metalness })
     }
 
     /// The material with another value of each parameter of a role.

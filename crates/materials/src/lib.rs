@@ -39,6 +39,7 @@ pub mod rough_interface;
 mod sampling;
 pub mod sheen;
 
+pub use body::BlackBody;
 pub use bsdf::{Bsdf, Lobe};
 pub use canonical::Canonical;
 pub use colour::hue;

@@ -1,12 +1,13 @@
 //! Gathers the moments of one row: samples on rings of half vectors, sixteen at a time. See [`crate::rings`].
 
-use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
+use std::f32::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::LazyLock;
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 use glam::DVec3;
 
 use crate::Rgb;
+use crate::angles::lanes::{half_turns, sin_cos, turns};
 use crate::bodies::Body;
 use crate::environment::EnvironmentMap;
 use crate::field::Field;
@@ -333,7 +334,7 @@ impl<'a, S: Simd> Gatherer<'a, S> {
     #[inline(always)]
     fn look(&self, direction: Vec3<S>, width: f32x16<S>, lit: mask32x16<S>, hits: &mut Hits) {
         let simd = self.simd;
-        let (sphere_distance, sphere) = self.nearest_sphere(direction);
+        let sphere_distance = self.nearest_sphere(direction);
         hits.light = [[0.0; LANES]; 4];
         let lit = lit.to_bitmask();
         let mut on_plane = 0;
@@ -364,6 +365,7 @@ impl<'a, S: Simd> Gatherer<'a, S> {
                 level = hit.select(level_of(footprint * (board.texels() as f32 * scale)), level);
             }
         }
+        let on_sphere = sphere_distance.simd_lt(f32::MAX).to_bitmask();
         let (u, v, level) = (u.to_array(), v.to_array(), level.to_array());
         for lane in 0..LANES {
             if lit >> lane & 1 == 0 {
@@ -374,8 +376,8 @@ impl<'a, S: Simd> Gatherer<'a, S> {
                     .board
                     .as_ref()
                     .map_or(Rgb::ZERO, |b| b.radiance.at_level(u[lane], v[lane], level[lane]))
-            } else if sphere[lane] != f32::MAX {
-                self.sphere_radiance(&direction, lane, sphere[lane])
+            } else if on_sphere >> lane & 1 == 1 {
+                self.sphere_radiance(&direction, lane)
             } else {
                 self.sky.map_or(Rgb::ZERO, |e| e.dimmed.at_level(u[lane], v[lane], level[lane]))
             };
@@ -390,15 +392,14 @@ impl<'a, S: Simd> Gatherer<'a, S> {
         if self.points[0].point.place.body == Body::Plane { f32::INFINITY } else { 0.0 }
     }
 
-    /// Distance to the nearest sphere in each lane, infinite where there is none; the second is the same, with
-    /// [`f32::MAX`] for infinity.
+    /// Distance to the nearest sphere in each lane; [`f32::MAX`] where there is none.
     #[inline(always)]
-    fn nearest_sphere(&self, direction: Vec3<S>) -> (f32x16<S>, Lanes) {
+    fn nearest_sphere(&self, direction: Vec3<S>) -> f32x16<S> {
         let mut nearest = f32x16::splat(self.simd, f32::MAX);
         let own = usize::from(matches!(self.points[0].point.place.body, Body::Sphere(_)));
         if self.field.bodies.spheres().len() <= own {
             // The only sphere is the one that the rays start from.
-            return (nearest, [f32::MAX; LANES]);
+            return nearest;
         }
         for (centre, radius) in self.field.bodies.spheres() {
             let [x, y, z] = self.position.0;
@@ -414,11 +415,11 @@ impl<'a, S: Simd> Gatherer<'a, S> {
                 & distance.simd_lt(nearest);
             nearest = hit.select(distance, nearest);
         }
-        (nearest, nearest.to_array())
+        nearest
     }
 
     /// Radiance of the sphere that a lane's ray meets.
-    fn sphere_radiance(&self, direction: &Vec3<S>, lane: usize, _distance: f32) -> Rgb {
+    fn sphere_radiance(&self, direction: &Vec3<S>, lane: usize) -> Rgb {
         let place: Place = self.points[lane % self.points.len()].point.place;
         let [x, y, z] = direction.0.map(|axis| f64::from(axis[lane]));
         self.field.body_radiance(&place, DVec3::new(x, y, z).normalize(), 0.0).unwrap_or(Rgb::ZERO)
@@ -517,51 +518,6 @@ fn add_functions(
             }
         }
     }
-}
-
-/// Sine and cosine of angles in `[−2π, 2π]`, to 2e-6.
-#[inline(always)]
-fn sin_cos<S: Simd>(angle: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-    // Of a quarter of the angle, by its series; then doubled twice.
-    let a = angle * 0.25;
-    let s = a * a;
-    let sine = s.mul_add(2.755_731_9e-6, -1.984_127e-4);
-    let sine = s.mul_add(sine, 8.333_333e-3);
-    let sine = s.mul_add(sine, -1.666_666_7e-1);
-    let sine = (s * sine).mul_add(a, a);
-    let cosine = s.mul_add(2.480_158_7e-5, -1.388_888_9e-3);
-    let cosine = s.mul_add(cosine, 4.166_666_6e-2);
-    let cosine = s.mul_add(cosine, -0.5);
-    let cosine = s.mul_add(cosine, 1.0);
-    let double = |(s, c): (f32x16<S>, f32x16<S>)| (s * c * 2.0, (s * s).mul_add(-2.0, 1.0));
-    double(double((sine, cosine)))
-}
-
-/// `atan2(y, x)/2π` in `[0, 1]`: see [`crate::angles::turns`].
-#[inline(always)]
-fn turns<S: Simd>(y: f32x16<S>, x: f32x16<S>) -> f32x16<S> {
-    let (ax, ay) = (x.abs(), y.abs());
-    let a = ax.min(ay) / ax.max(ay).max(f32::MIN_POSITIVE);
-    let s = a * a;
-    let p = s.mul_add(-0.011_721_2, 0.052_653_32);
-    let p = s.mul_add(p, -0.116_432_87);
-    let p = s.mul_add(p, 0.193_543_46);
-    let p = s.mul_add(p, -0.332_623_47);
-    let angle = s.mul_add(p, 0.999_977_26) * a;
-    let angle = ay.simd_gt(ax).select(FRAC_PI_2 - angle, angle);
-    let angle = x.simd_lt(0.0).select(PI - angle, angle);
-    let angle = y.simd_lt(0.0).select(TAU - angle, angle);
-    angle * (1.0 / TAU)
-}
-
-/// `acos(x)/π`: see [`crate::angles::half_turns`].
-#[inline(always)]
-fn half_turns<S: Simd>(x: f32x16<S>) -> f32x16<S> {
-    let a = x.abs().min(1.0);
-    let p = a.mul_add(-0.018_729_3, 0.074_261_0);
-    let p = a.mul_add(p, -0.212_114_4);
-    let angle = (1.0 - a).sqrt() * a.mul_add(p, 1.570_728_8);
-    x.simd_lt(0.0).select(PI - angle, angle) * (1.0 / PI)
 }
 
 /// The level of a pyramid whose texels are closest to a footprint of `texels` of the finest one.

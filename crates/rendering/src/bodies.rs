@@ -39,8 +39,6 @@ impl Bodies {
 
     /// The first body on a ray from `origin` along the unit vector `direction`, with its distance. A ray that starts on
     /// `from` does not see it: both kinds of bodies are convex.
-    // Inlined: a direction just computed and handed over in memory stalls the ring transport (a quarter of its time).
-    #[inline(always)]
     pub(crate) fn first(&self, origin: DVec3, direction: DVec3, from: Option<Body>) -> Option<(f64, Body)> {
         let mut nearest = None;
         let mut closest = f64::INFINITY;
@@ -82,7 +80,6 @@ impl Bodies {
         centre + normal * radius
     }
 
-    #[inline(always)]
     fn plane_distance(&self, origin: DVec3, direction: DVec3, from: Option<Body>) -> Option<f64> {
         let (height, half) = self.plane?;
         if from == Some(Body::Plane) || direction.y == 0.0 {

@@ -80,8 +80,6 @@ impl Field {
 
     /// Radiance that arrives at a place from a unit direction, averaged over about `angle` radians. Point lights have
     /// no extent and are never met; the environment's lamps are left to [`Field::lamps`].
-    // Inlined: a direction just computed and handed over in memory stalls the ring transport (a quarter of its time).
-    #[inline(always)]
     pub(crate) fn incident(&self, place: &Place, direction: DVec3, angle: f64) -> Rgb {
         self.body_radiance(place, direction, angle).unwrap_or_else(|| {
             self.environment.as_ref().map_or(Rgb::ZERO, |e| e.dimmed_radiance(direction, angle))
@@ -105,7 +103,6 @@ impl Field {
     }
 
     /// Radiance of the body that is met in a direction; `None` where there is none.
-    #[inline(always)]
     pub(crate) fn body_radiance(&self, place: &Place, direction: DVec3, angle: f64) -> Option<Rgb> {
         let (distance, body) = self.bodies.first(place.position, direction, Some(place.body))?;
         let point = place.position + direction * distance;

@@ -10,7 +10,7 @@ use bytemuck::{NoUninit, Pod, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut
 const MAGIC: [u8; 8] = *b"LMTRNSPT";
 
 /// To be raised when the order or the shape of what is written changes.
-pub(crate) const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 2;
 
 /// Pieces from this size on are hashed on all cores.
 const LARGE: usize = 1 << 18;

@@ -41,7 +41,7 @@ impl LobeTable {
         let lobe = if !bsdf.is_isotropic() {
             averaged(bsdf, &quadrature.geometries, (0..TURNS).map(|k| move |g: &Geometry<f32>| turned(g, k)))
         } else if !bsdf.is_mirror_symmetric() {
-            let both: [fn(&Geometry<f32>) -> Geometry<f32>; 2] = [|g| *g, |g| g.mirrored()];
+            let both: [Motion; 2] = [|g| *g, |g| g.mirrored()];
             averaged(bsdf, &quadrature.geometries, both.into_iter())
         } else {
             bsdf.specular_all(&quadrature.geometries)
@@ -76,6 +76,18 @@ impl LobeTable {
         self.angles.iter().step_by(4)
     }
 
+    /// A share of what is left of the lobe without another.
+    pub(crate) fn less(&self, other: Option<&Self>, share: f32) -> Self {
+        let mut rest = self.clone();
+        let coefficients = rest.angles.as_flattened_mut().as_flattened_mut();
+        if let Some(other) = other {
+            let others = other.angles.as_flattened().as_flattened();
+            coefficients.iter_mut().zip(others).for_each(|(rest, other)| *rest -= other);
+        }
+        coefficients.iter_mut().for_each(|rest| *rest *= share);
+        rest
+    }
+
     /// All coefficients, for hashing.
     pub(crate) fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(self.angles.as_flattened().as_flattened())
@@ -106,6 +118,9 @@ fn blend<S: Simd>(simd: S, rows: &[Coefficients], weights: [f32; 4], out: &mut [
 }
 
 const _: () = assert!((3 * ROW).is_multiple_of(16), "rows fill the registers of every instruction set");
+
+/// What a reflection is moved by.
+type Motion = fn(&Geometry<f32>) -> Geometry<f32>;
 
 /// Turns about the normal that an anisotropic lobe is averaged over.
 const TURNS: usize = 8;

@@ -1,6 +1,5 @@
 //! The built-in renderer: a scene prepared for one illumination, and pictures of materials in it.
 
-use std::f32::consts::PI;
 use std::io;
 use std::sync::LazyLock;
 
@@ -12,18 +11,17 @@ use crate::bodies::Body;
 use crate::bounce::{Bounce, MODES, Weights};
 use crate::cache::{Observe, Progress, TransportCache};
 use crate::field::Field;
-use crate::film::{Film, SUBSAMPLES, SurfacePoint};
+use crate::film::Film;
 use crate::flat::{Flat, Reader, Writer};
 use crate::gather;
 use crate::highlights::Highlights;
-use crate::irradiance::Place;
 use crate::lobes::{Expanded, Lobes, SplitLobes};
-use crate::returned::{Returned, ReturnedLight};
+use crate::returned::{DiffuseLight, Returned};
 use crate::rows::Rows;
 use crate::scene::{Illumination, Scene};
 use crate::source::Source;
 use crate::transport::{Lobe, Planes, Transport};
-use crate::{Rgb, SceneError, rgb};
+use crate::{Rgb, SceneError};
 
 #[cfg(test)]
 mod accuracy;
@@ -75,20 +73,6 @@ pub struct Renderer {
     mask: Mask,
 }
 
-/// Light that leaves a subject pixel diffusely.
-#[derive(Clone, Copy, Debug, Default)]
-struct DiffuseLight {
-    /// From spheres with a colour of their own.
-    own: Rgb,
-    /// From the others, for an albedo of 1.
-    white: Rgb,
-    /// Share of the pixel that they cover, by colour of their own and without one.
-    own_share: Rgb,
-    white_share: f32,
-    /// For an albedo of 1, of an irradiance of the checkerboard in each mode of the interreflection.
-    modes: [f32; MODES],
-}
-
 impl Renderer {
     /// Prepares a scene for pictures of `size` × `size` pixels (1 to 8192).
     ///
@@ -134,7 +118,7 @@ impl Renderer {
         let bounce = Bounce::prepare(scene, &field);
         let diffuse: Vec<DiffuseLight> = subjects
             .par_iter()
-            .map(|p| diffuse_light(scene, &field, &film, bounce.as_ref(), *p as usize))
+            .map(|pixel| DiffuseLight::of_pixel(scene, &field, &film, bounce.as_ref(), *pixel as usize))
             .collect();
         let board = bounce.as_ref().map_or(Vec::new(), |bounce| seen_modes(&field, &film, bounce));
         let highlights = Highlights::prepare(&field, &film, &subjects);
@@ -145,7 +129,7 @@ impl Renderer {
             background,
             subjects,
             rows,
-            returned: returned(&diffuse),
+            returned: Returned::new(&diffuse),
             bounce,
             board,
             highlights,
@@ -184,7 +168,7 @@ impl Renderer {
         let lobes = Lobes::new(materials.iter().map(bsdf).collect());
         let planes = self.subject_planes(&lobes);
         let materials = lobes.bsdfs.iter().zip(&lobes.expanded);
-        let weights = materials.map(|(bsdf, expanded)| self.weights(&**bsdf, expanded.as_ref()));
+        let weights = materials.map(|(bsdf, expanded)| self.weights(&**bsdf, expanded.as_deref()));
         planes.iter().zip(weights).map(|(planes, weights)| self.developed(planes, &weights)).collect()
     }
 
@@ -232,9 +216,7 @@ impl Renderer {
         let mut diffuse = self.subject_planes(&lobes.diffuse);
         let mut specular = self.planes(&lobes.whole, &|material| !lobes.is_plain[material]);
         specular.par_iter_mut().enumerate().filter(|(k, _)| !lobes.is_plain[*k]).for_each(|(k, planes)| {
-            for (plane, diffuse) in planes.iter_mut().zip(&diffuse[lobes.diffuse_of[k]]) {
-                plane.iter_mut().zip(diffuse).for_each(|(whole, diffuse)| *whole -= diffuse);
-            }
+            subtract(planes, &diffuse[lobes.diffuse_place(k)]);
         });
         diffuse.par_iter_mut().for_each(|planes| self.add_background(planes));
         SplitPlanes { specular, diffuse }
@@ -254,29 +236,29 @@ impl Renderer {
     }
 
     /// The planes of some materials: everything, or only what the lobes add to the Lambert term.
-    fn planes(&self, lobes: &Lobes, whole: &(dyn Fn(usize) -> bool + Sync)) -> Vec<Planes> {
+    fn planes(&self, lobes: &Lobes, is_whole: &(dyn Fn(usize) -> bool + Sync)) -> Vec<Planes> {
         let materials = lobes.bsdfs.par_iter().zip(&lobes.expanded);
         let waiting: Vec<Option<Lobe>> =
-            materials.map(|(bsdf, expanded)| Some(self.lobe(&**bsdf, expanded.as_ref()?))).collect();
+            materials.map(|(bsdf, expanded)| Some(self.lobe(&**bsdf, expanded.as_deref()?))).collect();
         let mut lit = self.lit(&waiting.iter().flatten().collect::<Vec<_>>()).into_iter();
         let lit: Vec<Option<(&Lobe, Planes)>> =
             waiting.iter().map(|lobe| lobe.as_ref().and_then(|lobe| Some((lobe, lit.next()?)))).collect();
-        let finished = |(k, (bsdf, lit)): (usize, (&Box<dyn Bsdf>, _))| self.finished(&**bsdf, lit, whole(k));
-        lobes.bsdfs.par_iter().zip(lit).enumerate().map(finished).collect()
+        let materials = lobes.bsdfs.par_iter().zip(lit).enumerate();
+        materials.map(|(k, (bsdf, lit))| self.finished(&**bsdf, lit, is_whole(k))).collect()
     }
 
     /// What the rings made of a lobe, with all that they do not hold.
-    fn finished(&self, bsdf: &dyn Bsdf, lit: Option<(&Lobe, Planes)>, whole: bool) -> Planes {
+    fn finished(&self, bsdf: &dyn Bsdf, lit: Option<(&Lobe, Planes)>, is_whole: bool) -> Planes {
         let without = self.weights(bsdf, None);
         let (mut planes, weights) = match lit {
             Some((lobe, mut image)) => {
                 self.add_lights(bsdf, &mut image);
-                (image, if whole { lobe.weights } else { difference(&lobe.weights, &without) })
+                (image, if is_whole { lobe.weights } else { difference(&lobe.weights, &without) })
             }
-            None if whole => (self.black(), without),
+            None if is_whole => (self.black(), without),
             None => return self.black(),
         };
-        if whole {
+        if is_whole {
             self.returned.add_baked(bsdf.diffuse(), &mut planes);
         }
         self.returned.add(&weights, bsdf.diffuse(), &mut planes);
@@ -343,7 +325,8 @@ impl Renderer {
         let film = Film::new(&source.scene.camera, source.size);
         let mask = subject_mask(&source.scene, &film).map_err(io::Error::other)?;
         let source = source.clone();
-        let bake = move || source.bake_apart().expect("the light was baked before it was kept");
+        // The file of the map may be gone by now: its content was read with the source, and baked before under the same key.
+        let bake = move || source.bake_apart().expect("the same content was baked before");
         Ok(Self {
             field: LazyLock::new(Box::new(bake)),
             film,
@@ -373,30 +356,26 @@ impl Scene {
     }
 }
 
-fn difference(a: &Weights, b: &Weights) -> Weights {
-    std::array::from_fn(|m| std::array::from_fn(|c| a[m][c] - b[m][c]))
+fn subtract(planes: &mut Planes, others: &Planes) {
+    for (plane, other) in planes.iter_mut().zip(others) {
+        plane.iter_mut().zip(other).for_each(|(value, other)| *value -= other);
+    }
 }
 
-/// What the diffuse term reflects of irradiance on the checkerboard.
-fn returned(diffuse: &[DiffuseLight]) -> Returned {
-    let rgb = |v: Rgb| [v.x, v.y, v.z];
-    Returned::new(diffuse.iter().map(|d| ReturnedLight {
-        own: rgb(d.own),
-        white: rgb(d.white),
-        own_share: rgb(d.own_share),
-        white_share: d.white_share,
-        modes: d.modes,
-    }))
+fn difference(a: &Weights, b: &Weights) -> Weights {
+    std::array::from_fn(|m| std::array::from_fn(|c| a[m][c] - b[m][c]))
 }
 
 /// What pixels see of the checkerboard for an irradiance in each mode.
 fn seen_modes(field: &Field, film: &Film, bounce: &Bounce) -> Vec<(u32, [f32; MODES])> {
     let pixel = |pixel: u32| {
+        // As many positions as what lies before the checkerboard is seen through.
+        let (_, count) = film.points(&field.bodies, pixel as usize);
         let mut sums = [0.0; MODES];
-        for direction in film.directions(pixel as usize, SUBSAMPLES) {
+        for direction in film.directions(pixel as usize, count) {
             if let Some((u, v, brightness)) = field.board_from(film.eye, direction) {
                 let values = bounce.modes.at(u, v);
-                (0..MODES).for_each(|m| sums[m] += brightness * values[m] / SUBSAMPLES as f32);
+                (0..MODES).for_each(|m| sums[m] += brightness * values[m] / count as f32);
             }
         }
         (sums != [0.0; MODES]).then_some((pixel, sums))
@@ -417,42 +396,6 @@ fn look(field: &Field, film: &Film) -> (Vec<Rgb>, Vec<bool>) {
         (sum / count as f32, !points.is_empty())
     };
     (0..film.size * film.size).into_par_iter().map(pixel).unzip()
-}
-
-/// Diffuse light of one pixel. Point lights have hard shadows and are evaluated at each sub-pixel sample; the rest is
-/// smooth and evaluated once per sphere, at the mean of its samples.
-fn diffuse_light(
-    scene: &Scene,
-    field: &Field,
-    film: &Film,
-    bounce: Option<&Bounce>,
-    pixel: usize,
-) -> DiffuseLight {
-    let (points, count) = film.points(&field.bodies, pixel);
-    let mut light = DiffuseLight::default();
-    for (sphere, description) in scene.spheres.iter().enumerate() {
-        let here: Vec<&SurfacePoint> = points.iter().filter(|p| p.sphere == sphere).collect();
-        let Some(first) = here.first() else { continue };
-        let normal = here.iter().map(|p| p.place.normal).sum::<glam::DVec3>().normalize();
-        let mean = Place { position: field.bodies.point(sphere, normal), normal, body: first.place.body };
-        let sharp: Rgb = here.iter().map(|p| field.point_irradiance(&p.place)).sum();
-        let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
-        let radiance = irradiance / (count as f32 * PI);
-        let share = here.len() as f32 / count as f32;
-        match description.diffuse {
-            Some(own) => {
-                (light.own, light.own_share) =
-                    (light.own + rgb(own) * radiance, light.own_share + rgb(own) * share)
-            }
-            None => (light.white, light.white_share) = (light.white + radiance, light.white_share + share),
-        }
-        if let Some(bounce) = bounce {
-            // Where several spheres share a pixel, the last one's light stands for all.
-            let tinted = bounce.irradiance(sphere, normal);
-            light.modes = tinted.map(|e| e / PI);
-        }
-    }
-    light
 }
 
 /// The radial mask of every sphere.

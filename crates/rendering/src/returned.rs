@@ -1,27 +1,83 @@
 //! What the diffuse term of all subject pixels reflects: of the baked light, and of irradiance that the material adds to the
 //! checkerboard.
 
+use std::f32::consts::PI;
 use std::io;
 
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use glam::DVec3;
 
-use crate::bounce::{MODES, Weights};
+use crate::bounce::{Bounce, MODES, Weights};
+use crate::field::Field;
+use crate::film::{Film, SurfacePoint};
 use crate::flat::{Flat, Reader, Writer};
+use crate::irradiance::Place;
+use crate::scene::Scene;
 use crate::transport::Planes;
+use crate::{Rgb, rgb};
 
-/// One subject pixel: its baked light from spheres with a colour of their own and, for an albedo of 1, from others; the shares
-/// of it that they cover; and what it gets of irradiance of the checkerboard in each mode.
-pub(crate) struct ReturnedLight {
-    pub(crate) own: [f32; 3],
-    pub(crate) white: [f32; 3],
-    pub(crate) own_share: [f32; 3],
-    pub(crate) white_share: f32,
-    pub(crate) modes: [f32; MODES],
+/// Light that leaves one subject pixel diffusely.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct DiffuseLight {
+    /// Baked light, from spheres with a colour of their own.
+    own: Rgb,
+    /// From the others, for an albedo of 1.
+    white: Rgb,
+    /// Of an irradiance of the checkerboard in each mode of the interreflection: by spheres with a colour of their own, for
+    /// each channel, then by the others, for an albedo of 1.
+    modes: [[f32; MODES]; 4],
+}
+
+impl DiffuseLight {
+    /// The light of a pixel. Point lights have hard shadows and are evaluated at each sub-pixel sample; the rest is
+    /// smooth and evaluated once per sphere, at the mean of its samples.
+    pub(crate) fn of_pixel(
+        scene: &Scene,
+        field: &Field,
+        film: &Film,
+        bounce: Option<&Bounce>,
+        pixel: usize,
+    ) -> Self {
+        let (points, count) = film.points(&field.bodies, pixel);
+        let mut light = Self::default();
+        for (sphere, description) in scene.spheres.iter().enumerate() {
+            let here: Vec<&SurfacePoint> = points.iter().filter(|p| p.sphere == sphere).collect();
+            let Some(first) = here.first() else { continue };
+            let normal = here.iter().map(|p| p.place.normal).sum::<DVec3>().normalize();
+            let mean = Place { position: field.bodies.point(sphere, normal), normal, body: first.place.body };
+            let sharp: Rgb = here.iter().map(|p| field.point_irradiance(&p.place)).sum();
+            let irradiance = sharp + field.smooth_irradiance(&mean) * here.len() as f32;
+            let radiance = irradiance / (count as f32 * PI);
+            let share = here.len() as f32 / count as f32;
+            let colour = match description.diffuse {
+                Some(own) => {
+                    light.own += rgb(own) * radiance;
+                    rgb(own)
+                }
+                None => {
+                    light.white += radiance;
+                    Rgb::W
+                }
+            };
+            if let Some(bounce) = bounce {
+                light.add_modes(colour * share, bounce.irradiance(sphere, normal));
+            }
+        }
+        light
+    }
+
+    /// Adds what a sphere reflects of irradiance in each mode; its albedo times its share of the pixel, for channels and for
+    /// an albedo of 1.
+    fn add_modes(&mut self, share: Rgb, irradiance: [f32; MODES]) {
+        for (modes, share) in self.modes.iter_mut().zip(share.to_array()) {
+            modes.iter_mut().zip(irradiance).for_each(|(mode, e)| *mode += share * (e / PI));
+        }
+    }
 }
 
 /// All subject pixels, number by number.
 pub(crate) struct Returned {
-    /// Modes times shares: of spheres with a colour of their own by channel, then of the others.
+    /// [`DiffuseLight::modes`]
     planes: [[Vec<f32>; MODES]; 4],
     own: Planes,
     white: Planes,
@@ -29,15 +85,12 @@ pub(crate) struct Returned {
 }
 
 impl Returned {
-    pub(crate) fn new(lights: impl Iterator<Item = ReturnedLight> + Clone) -> Self {
-        let plane = |share: usize, m: usize| -> Vec<f32> {
-            let share = |l: &ReturnedLight| if share < 3 { l.own_share[share] } else { l.white_share };
-            lights.clone().map(|l| share(&l) * l.modes[m]).collect()
-        };
+    pub(crate) fn new(lights: &[DiffuseLight]) -> Self {
+        let plane = |value: &dyn Fn(&DiffuseLight) -> f32| -> Vec<f32> { lights.iter().map(value).collect() };
         Self::of(
-            std::array::from_fn(|share| std::array::from_fn(|m| plane(share, m))),
-            std::array::from_fn(|c| lights.clone().map(|l| l.own[c]).collect()),
-            std::array::from_fn(|c| lights.clone().map(|l| l.white[c]).collect()),
+            std::array::from_fn(|share| std::array::from_fn(|m| plane(&|light| light.modes[share][m]))),
+            std::array::from_fn(|c| plane(&|light| light.own[c])),
+            std::array::from_fn(|c| plane(&|light| light.white[c])),
         )
     }
 

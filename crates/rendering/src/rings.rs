@@ -28,7 +28,7 @@ pub(crate) fn node(j: usize) -> f64 {
 }
 
 /// The interval between nodes that an angle lies in, and the share of its right-hand hat function.
-pub(crate) fn hat_position(theta: f64) -> (usize, f64) {
+fn hat_position(theta: f64) -> (usize, f64) {
     let interval = (((theta / FRAC_PI_2).powf(0.4) * (NODES - 1) as f64) as usize).min(NODES - 2);
     let share = (theta - node(interval)) / (node(interval + 1) - node(interval));
     (interval, share.clamp(0.0, 1.0))
@@ -70,6 +70,34 @@ impl Ring {
     /// The `cos_d` at a position on the ring.
     pub(crate) fn cos_d(&self, position: f64) -> f64 {
         0.5 * (self.low + self.high + position * (self.high - self.low))
+    }
+}
+
+/// A single direction of light in the basis: what it adds to the moments of a view.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RingPoint {
+    /// `dω_i/(dθ_h dφ_h) = 4 cos_d sin θ_h`: irradiance over it, times a basis function, is that function's moment.
+    pub(crate) density: f64,
+    /// The nodes that θ_h lies between, with their hat functions.
+    pub(crate) hats: [(usize, f64); 2],
+    /// The Chebyshev polynomials at the position on the ring.
+    pub(crate) polynomials: [f64; TERMS],
+}
+
+impl RingPoint {
+    /// For a view at θ_o (as cosine and sine), and a half vector at θ_h with its `cos_d = ω_o·h`; `None` where the ring lies
+    /// below the horizon.
+    pub(crate) fn new(view: (f64, f64), cos_h: f64, cos_d: f64) -> Option<Self> {
+        let cos_h = cos_h.min(1.0);
+        // Above 0: a mirrored light would have no density.
+        let sin_h = (1.0 - cos_h * cos_h).sqrt().max(1e-9);
+        let ring = Ring::new(view, (cos_h, sin_h))?;
+        let (interval, share) = hat_position(sin_h.atan2(cos_h));
+        Some(Self {
+            density: 4.0 * cos_d * sin_h,
+            hats: [(interval, 1.0 - share), (interval + 1, share)],
+            polynomials: chebyshev(ring.position(cos_d)),
+        })
     }
 }
 

@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::field::Field;
 use crate::film::{Film, SurfacePoint};
 use crate::product::LANES;
+use crate::rings::RingPoint;
 
 /// Range of angles of view, in radians, that one row stands for.
 const NARROW: f64 = 0.05;
@@ -32,6 +33,13 @@ impl View {
     /// Angle of view in radians.
     pub(crate) fn angle(&self) -> f64 {
         self.cosine.acos()
+    }
+
+    /// Where light from a unit direction lies in the basis of the rings; `None` where its ring lies below the horizon.
+    pub(crate) fn ring_point(&self, direction: DVec3) -> Option<RingPoint> {
+        let SurfacePoint { place, wo, .. } = &self.point;
+        let h = (direction + *wo).normalize();
+        RingPoint::new((self.cosine, self.sine), h.dot(place.normal), wo.dot(h))
     }
 }
 

@@ -1,8 +1,8 @@
 //! All that prepared light depends on, and its key.
 
 use std::borrow::Cow;
+use std::panic::resume_unwind;
 use std::path::Path;
-use std::sync::mpsc;
 
 use blake3::{Hash, Hasher};
 use fearless_simd::Level;
@@ -16,7 +16,7 @@ use crate::scene::{Illumination, Scene};
 
 /// To be raised with every change of the renderer that changes a bit of what it prepares: files that an older program
 /// kept are then left alone, and built again.
-const ALGORITHM_VERSION: u32 = 3;
+const ALGORITHM_VERSION: u32 = 4;
 
 /// A scene, its lights and a picture size, with the content of the environment map.
 #[derive(Clone, Debug)]
@@ -47,16 +47,22 @@ impl Source {
 
     /// [`Source::bake`] in threads of its own, for a caller that others may wait for: a thread of the common pool that waits
     /// for its share of the work takes up other jobs meanwhile, and must not take up one that waits for the light.
-    pub(crate) fn bake_apart(self) -> Result<Field, SceneError> {
+    pub(crate) fn bake_apart(&self) -> Result<Field, SceneError> {
         let Ok(pool) = ThreadPoolBuilder::new().build() else { return self.bake() };
-        let (send, receive) = mpsc::channel();
-        pool.spawn(move || send.send(self.bake()).expect("the receiver waits"));
-        receive.recv().expect("a job that ends")
+        std::thread::scope(|scope| {
+            // The caller waits for a thread of no pool, and so idly.
+            let waiting = std::thread::Builder::new().spawn_scoped(scope, || pool.install(|| self.bake()));
+            waiting.map_or_else(
+                |_| self.bake(),
+                |thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)),
+            )
+        })
     }
 
     /// Equal for sources whose prepared light is the same to the bit, and for no others.
     pub(crate) fn key(&self) -> Hash {
-        let scene = toml::to_string(&self.relevant()).expect("a scene is plain data");
+        // Prints every field, and numbers to the last bit.
+        let scene = format!("{:?}", self.relevant());
         let lights = format!("{:?}", self.illumination);
         // Instruction sets round differently, and numbers are kept as the processor holds them.
         let machine = format!("{} {:?}", std::env::consts::ARCH, Level::new());
@@ -83,8 +89,8 @@ impl Source {
         if let Some(light) = &mut scene.environment
             && let Some(extension) = Path::new(&light.map).extension()
         {
-            // It tells the format of the content.
-            light.map = format!(".{}", extension.to_string_lossy().to_lowercase());
+            // It tells the format of the content; a name of its own, because a file that is called no more than `.exr` has none.
+            light.map = format!("map.{}", extension.to_string_lossy().to_lowercase());
         }
         scene
     }
@@ -93,4 +99,40 @@ impl Source {
 /// Adds a part and where it ends.
 fn add(hasher: &mut Hasher, part: &[u8]) {
     hasher.update(&(part.len() as u64).to_le_bytes()).update_rayon(part);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::EnvironmentLight;
+
+    fn source(map: &str) -> Source {
+        let environment = Some(EnvironmentLight::of(map));
+        let scene = Scene { environment, ..Scene::reference() };
+        Source { scene, illumination: Illumination::Environment, size: 8, map: Cow::Borrowed(b"content") }
+    }
+
+    #[test]
+    fn only_maps_of_one_format_share_a_key() {
+        let key = |map: &str| source(map).key();
+        assert_eq!(key("a.exr"), key("elsewhere/b.EXR"));
+        let others = ["a.hdr", ".exr", "exr", "a", "designed", "interior"].map(key);
+        assert!(others.iter().all(|other| *other != key("a.exr")));
+        let turned = |turn: f64| {
+            let mut source = source("a.exr");
+            source.scene.environment =
+                Some(EnvironmentLight { rotation: turn, ..EnvironmentLight::of("a.exr") });
+            source.key()
+        };
+        assert_ne!(turned(30.0), turned(30.0_f64.next_up()), "every bit of a number counts");
+    }
+
+    #[test]
+    fn light_is_baked_apart_as_in_place() {
+        let lit = Source::new(&Scene::reference(), Illumination::Environment, 8).unwrap();
+        let foot = glam::DVec3::new(0.3, -1.0, 0.2);
+        let seen = |field: Field| field.board.unwrap().exact(foot, crate::Rgb::ZERO);
+        assert_eq!(seen(lit.bake_apart().unwrap()), seen(lit.bake().unwrap()));
+        assert!(source("broken.exr").bake_apart().unwrap_err().to_string().contains("broken.exr"));
+    }
 }

@@ -17,7 +17,7 @@ use crate::flat::{Flat, Reader, Writer};
 use crate::highlights::is_near_lamp;
 use crate::lobe_table::LobeTable;
 use crate::product::{self, GROUP, LANES, Lanes, Moments, Reflected};
-use crate::rings::{ROW, Ring, chebyshev, hat_position};
+use crate::rings::ROW;
 use crate::rows::{Row, Rows, View};
 
 /// Largest difference of the angles of view in a bundle, in radians, in a picture of 300 pixels; angles are rounded to
@@ -217,24 +217,17 @@ fn gather_row(field: &Field, points: &[View], coverage: f32) -> arcs::Moments {
     moments
 }
 
-/// Adds the environment's lamps, each a single direction, but for those that are evaluated as highlights: `dω_i = 4 cos_d sin θ_h dθ_h dφ_h` turns its irradiance into
-/// moments.
+/// Adds the environment's lamps, but for those that are evaluated as highlights.
 fn add_lamps(field: &Field, points: &[View], coverage: f32, moments: &mut arcs::Moments) {
     for view in points {
         let far = |(direction, _): &(DVec3, Rgb)| !is_near_lamp(&view.point, *direction);
         for (direction, irradiance) in field.lamps(view.point.place).filter(far) {
-            let h = (direction + view.point.wo).normalize();
-            let cos_h = h.dot(view.point.place.normal).min(1.0);
-            let sin_h = (1.0 - cos_h * cos_h).sqrt();
-            let Some(ring) = Ring::new((view.cosine, view.sine), (cos_h, sin_h)) else { continue };
-            let cos_d = view.point.wo.dot(h);
-            let density = 4.0 * cos_d * sin_h * points.len() as f64 / f64::from(coverage);
-            let (interval, hat) = hat_position(sin_h.atan2(cos_h));
-            for (k, t) in chebyshev(ring.position(cos_d)).into_iter().enumerate() {
+            let Some(at) = view.ring_point(direction) else { continue };
+            let density = at.density * points.len() as f64 / f64::from(coverage);
+            for (k, t) in at.polynomials.into_iter().enumerate() {
                 let moment = irradiance * (t / density) as f32;
-                for c in 0..3 {
-                    moments[interval][k][c] += moment[c] * (1.0 - hat) as f32;
-                    moments[interval + 1][k][c] += moment[c] * hat as f32;
+                for (node, hat) in at.hats {
+                    (0..3).for_each(|c| moments[node][k][c] += moment[c] * hat as f32);
                 }
             }
         }

@@ -158,11 +158,27 @@ fn a_file_belongs_to_what_the_light_depends_on() {
     assert!(environment(&map("a.exr", 2.0)), "another map of the same name");
     assert!(!point(&map("c.exr", 3.0)), "a map that is not lit");
     assert!(!point(&Scene { name: "called otherwise".into(), ..bare() }));
-    // What was prepared of a map needs it no more, not even for what is baked later.
-    let scene = map("a.exr", 2.0);
-    let (renderer, _) = made(&scene, Illumination::Environment, SIZE, &cache);
-    fs::remove_file(folder.path().join("a.exr")).unwrap();
-    pictures(&renderer);
+    assert!(!environment(&map("A.EXR", 2.0)), "the same map of a name in capitals");
+}
+
+#[test]
+fn a_map_that_is_gone_is_missed_at_once_or_never() {
+    let folder = TempDir::new().unwrap();
+    let cache = TransportCache::new(folder.path().join("cache"));
+    let map = folder.path().join("map.exr");
+    lookmatch_imaging::write(&map, &Image::from_fn(8, 4, |x, y| [1.0, x as f32, y as f32]), &[]).unwrap();
+    let scene = Scene { environment: Some(EnvironmentLight::of(map.to_str().unwrap())), ..bare() };
+    let (built, _) = made(&scene, Illumination::Environment, SIZE, &cache);
+    let (read, told) = made(&scene, Illumination::Environment, SIZE, &cache);
+    assert_eq!(told, [Progress::Loaded]);
+    fs::remove_file(&map).unwrap();
+    // Kept light does without the map, anisotropic lobes too, whose light is baked only now; …
+    assert!(pictures(&read) == pictures(&built));
+    // … but it is found by the map's content.
+    match Renderer::cached(&scene, Illumination::Environment, SIZE, &cache, &|_| ()) {
+        Ok(_) => panic!("accepted"),
+        Err(error) => assert!(error.to_string().contains("map.exr"), "{error}"),
+    }
 }
 
 #[test]

@@ -133,3 +133,37 @@ fn a_turned_map_turns_what_is_seen_of_it() {
     assert!(at(0.0) == at(360.0));
     assert!(at(0.0) != at(90.0));
 }
+
+#[test]
+fn the_order_of_spheres_does_not_matter() {
+    let mut scene = Scene::reference();
+    // Behind the first, and partly hidden by it.
+    let mut other = scene.spheres[0].clone();
+    (other.centre, other.radius) = ([0.9, -0.2, -2.0], 0.8);
+    scene.spheres.push(other);
+    let picture = |scene: &Scene| {
+        let renderer = Renderer::prepare(scene, Illumination::Environment, 48).unwrap();
+        renderer.render(&material("lambert:diffuse=0.9"), Part::Full)
+    };
+    let ab = picture(&scene);
+    scene.spheres.reverse();
+    let ba = picture(&scene);
+    let difference = bend(&ab, &ba, &ab);
+    assert!(difference < 1e-4, "{difference}");
+}
+
+#[test]
+fn sunken_spheres_give_finite_pictures() {
+    // The middle of the checkerboard is a node of the grid of interreflection.
+    for height in [-0.7, -1.0, -1.5] {
+        let mut scene = Scene::reference();
+        scene.spheres[0].centre[1] = height;
+        let renderer = Renderer::prepare(&scene, Illumination::All, 16).unwrap();
+        for text in ["ggx-conductor:roughness=0.1", "lambert:diffuse=0.8"] {
+            let picture = renderer.render(&material(text), Part::Full);
+            assert!(picture.pixels().iter().flatten().all(|v| v.is_finite()), "{height} {text}");
+            let sum: f32 = picture.pixels().iter().flatten().sum();
+            assert!(sum > 0.0, "{height} {text}");
+        }
+    }
+}

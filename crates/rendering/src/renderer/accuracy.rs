@@ -26,10 +26,10 @@ fn thinned(scene: &Scene, renderer: Renderer, pixels: &[u32]) -> Renderer {
     let Renderer { field, film, .. } = &renderer;
     let rows = Rows::new(field, film, pixels);
     let subjects: Vec<u32> = rows.main.iter().map(|row| row.pixel).collect();
-    let light = |p: &u32| diffuse_light(scene, field, film, renderer.bounce.as_ref(), *p as usize);
+    let light = |p: &u32| DiffuseLight::of_pixel(scene, field, film, renderer.bounce.as_ref(), *p as usize);
     let diffuse: Vec<DiffuseLight> = subjects.iter().map(light).collect();
     let highlights = Highlights::prepare(field, film, &subjects);
-    Renderer { subjects, rows, returned: returned(&diffuse), highlights, ..renderer }.keep_transport()
+    Renderer { subjects, rows, returned: Returned::new(&diffuse), highlights, ..renderer }.keep_transport()
 }
 
 /// Prints and checks the mean ΔE*76 of materials, each with the most that is accepted.
