@@ -4,7 +4,11 @@
 //! interface or a coat, it is what gets through them: the specular reflection is then that of the layers alone. A picture
 //! of a black body can be had of any renderer. A tint of the lobe that follows the body's colour goes with the body.
 
-use crate::{Bsdf, Geometry, Material, Role, Sampling, Technique, Value};
+use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
+
+use crate::quadrature::Gauss;
+use crate::{Bsdf, Geometry, Material, MaterialError, Role, Sampling, Technique, Value};
 
 /// A dielectric with its body's colour and with a black one: the diffuse reflection is a share of their difference.
 pub struct BlackBody {
@@ -65,6 +69,32 @@ impl Body {
     }
 }
 
+/// Cosines of light and viewer, and azimuths between them in a half turn.
+const COSINES: usize = 4;
+const TURNS: usize = 6;
+
+/// Light and viewer all over the hemisphere, with weights `2 cos θ_i cos θ_o dω_i dμ_o`: an integral over them is what is
+/// reflected of uniform light.
+static HEMISPHERE: LazyLock<Vec<(Geometry<f32>, f64)>> = LazyLock::new(|| {
+    let mut pairs = Vec::new();
+    let gauss = Gauss::new(COSINES);
+    for (cos_i, weight_i) in gauss.on(0.0, 1.0) {
+        for (cos_o, weight_o) in gauss.on(0.0, 1.0) {
+            for turn in 0..TURNS {
+                let direction = |cos: f64, phi: f64| {
+                    let sin = (1.0 - cos * cos).sqrt();
+                    [sin * phi.cos(), sin * phi.sin(), cos]
+                };
+                let phi = PI * (turn as f64 + 0.5) / TURNS as f64;
+                let weight = 2.0 * cos_i * cos_o * weight_i * weight_o * TAU / TURNS as f64;
+                let geometry = Geometry::new(direction(cos_i, phi), direction(cos_o, 0.0));
+                pairs.extend(geometry.map(|g| (g.to_f32(), weight)));
+            }
+        }
+    }
+    pairs
+});
+
 /// Lambert's reflection alone.
 fn lambert(diffuse: [f64; 3]) -> Box<dyn Bsdf> {
     Box::new(crate::models::lambert::Lambert { diffuse })
@@ -96,6 +126,42 @@ impl Material {
         Some(BlackBody { coloured, black, share: 1.0 - metalness })
     }
 
+    /// The share of uniform light that the diffuse reflection sends back, per channel: what a furnace would show. Good to
+    /// some thousandths.
+    pub fn diffuse_albedo(&self) -> [f64; 3] {
+        let bsdf = self.diffuse_bsdf();
+        let mut albedo = bsdf.diffuse();
+        if bsdf.sampling().is_none() {
+            return albedo;
+        }
+        let geometries: Vec<Geometry<f32>> = HEMISPHERE.iter().map(|(g, _)| *g).collect();
+        for (f, (_, weight)) in bsdf.specular_all(&geometries).into_iter().zip(&*HEMISPHERE) {
+            (0..3).for_each(|c| albedo[c] += f64::from(f[c]) * weight);
+        }
+        albedo
+    }
+
+    /// Sets the body's colour to what gives the diffuse reflection an albedo, as far as the model's range goes.
+    ///
+    /// # Errors
+    /// None for the models of the catalogue.
+    pub fn set_diffuse_albedo(&mut self, role: Role, wanted: [f64; 3]) -> Result<(), MaterialError> {
+        let mut colour = wanted;
+        self.set_role(role, colour)?;
+        // The albedo is nearly proportional to the colour: what two steps leave cannot be seen.
+        for _ in 0..2 {
+            let albedo = self.diffuse_albedo();
+            if (0..3).all(|c| (wanted[c] - albedo[c]).abs() < 2e-4) {
+                break;
+            }
+            let scaled =
+                |c: usize| if albedo[c] > 0.0 { colour[c] * wanted[c] / albedo[c] } else { colour[c] };
+            colour = std::array::from_fn(|c| scaled(c).min(1.0));
+            self.set_role(role, colour)?;
+        }
+        Ok(())
+    }
+
     /// The material with another value of each parameter of a role.
     fn with_role(&self, role: Role, value: &Value) -> Self {
         let mut copy = self.clone();
@@ -112,6 +178,23 @@ mod tests {
     fn values(text: &str, wi: [f64; 3], wo: [f64; 3]) -> [f64; 2] {
         let material = Material::parse(text).unwrap();
         [material.diffuse_bsdf(), material.bsdf()].map(|bsdf| bsdf.evaluate(wi, wo)[0])
+    }
+
+    #[test]
+    fn diffuse_albedos_can_be_measured_and_set() {
+        let albedo = |text: &str| Material::parse(text).unwrap().diffuse_albedo()[0];
+        assert_eq!(albedo("ggx:diffuse=0.3"), 0.3);
+        // EON reflects all of a white furnace.
+        assert!((albedo("oren-nayar:variant=eon,diffuse=1,roughness=0.8") - 1.0).abs() < 5e-3);
+        for text in ["rough-plastic:alpha=0.3", "ashikhmin-shirley:f0=0.3", "disney:roughness=0.3", "openpbr"]
+        {
+            let mut material = Material::parse(text).unwrap();
+            let role = [Role::DiffuseReflectance, Role::BaseColour];
+            let role = role.into_iter().find(|role| material.by_role(*role).is_some()).unwrap();
+            material.set_diffuse_albedo(role, [0.1, 0.2, 0.3]).unwrap();
+            let found = material.diffuse_albedo();
+            assert!((0..3).all(|c| (found[c] - 0.1 * (c + 1) as f64).abs() < 1e-3), "{material}: {found:?}");
+        }
     }
 
     #[test]

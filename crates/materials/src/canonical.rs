@@ -1,12 +1,8 @@
 //! What the parameters of a material say, in terms that all models share: how one model's values are read for another.
 
-use std::f64::consts::{PI, TAU};
-use std::sync::LazyLock;
-
 use crate::colour::{hue, mean};
 use crate::fresnel::{Fresnel, f0_from_ior, ior_from_f0};
-use crate::quadrature::Gauss;
-use crate::{Geometry, Material, MaterialError, Role, Value};
+use crate::{Material, MaterialError, Role, Value};
 
 /// The look of a material as its parameters foretell it, without rendering: exact for some models, a rule of thumb for
 /// others. It is where a match starts, and what people copy who have no match.
@@ -33,78 +29,7 @@ impl Canonical {
     }
 }
 
-/// Cosines of light and viewer, and azimuths between them in a half turn.
-const COSINES: usize = 6;
-const TURNS: usize = 8;
-
-/// Light and viewer all over the hemisphere, with weights `2 cos θ_i cos θ_o dω_i dμ_o`: an integral over them is what is
-/// reflected of uniform light.
-static HEMISPHERE: LazyLock<Vec<(Geometry<f32>, f64)>> = LazyLock::new(|| {
-    let mut pairs = Vec::new();
-    let gauss = Gauss::new(COSINES);
-    for (cos_i, weight_i) in gauss.on(0.0, 1.0) {
-        for (cos_o, weight_o) in gauss.on(0.0, 1.0) {
-            for turn in 0..TURNS {
-                let direction = |cos: f64, phi: f64| {
-                    let sin = (1.0 - cos * cos).sqrt();
-                    [sin * phi.cos(), sin * phi.sin(), cos]
-                };
-                let phi = PI * (turn as f64 + 0.5) / TURNS as f64;
-                let weight = 2.0 * cos_i * cos_o * weight_i * weight_o * TAU / TURNS as f64;
-                let geometry = Geometry::new(direction(cos_i, phi), direction(cos_o, 0.0));
-                pairs.extend(geometry.map(|g| (g.to_f32(), weight)));
-            }
-        }
-    }
-    pairs
-});
-
 impl Material {
-    /// The share of uniform light that the diffuse reflection sends back, per channel: what a furnace would show. Good to
-    /// some thousandths.
-    pub fn diffuse_albedo(&self) -> [f64; 3] {
-        let bsdf = self.diffuse_bsdf();
-        let mut albedo = bsdf.diffuse();
-        if bsdf.sampling().is_none() {
-            return albedo;
-        }
-        let geometries: Vec<Geometry<f32>> = HEMISPHERE.iter().map(|(g, _)| *g).collect();
-        for (f, (_, weight)) in bsdf.specular_all(&geometries).into_iter().zip(&*HEMISPHERE) {
-            (0..3).for_each(|c| albedo[c] += f64::from(f[c]) * weight);
-        }
-        albedo
-    }
-
-    /// Sets the body's colour to what gives the diffuse reflection an albedo, as far as the model's range goes.
-    ///
-    /// # Errors
-    /// None for the models of the catalogue.
-    pub fn set_diffuse_albedo(&mut self, role: Role, wanted: [f64; 3]) -> Result<(), MaterialError> {
-        let near = |albedo: [f64; 3]| (0..3).all(|c| (wanted[c] - albedo[c]).abs() < 1e-4);
-        self.set_role(role, wanted)?;
-        let (mut colour, mut albedo) = (wanted, self.diffuse_albedo());
-        if near(albedo) {
-            return Ok(());
-        }
-        self.set_role(role, [0.0; 3])?;
-        let (mut last, mut last_albedo) = ([0.0; 3], self.diffuse_albedo());
-        // The albedo is nearly linear in the colour: two steps of the secant rule leave nothing to see.
-        for _ in 0..2 {
-            let better = std::array::from_fn(|c| {
-                let slope = (albedo[c] - last_albedo[c]) / (colour[c] - last[c]);
-                let step = (wanted[c] - albedo[c]) / slope;
-                if step.is_finite() { (colour[c] + step).clamp(0.0, 1.0) } else { colour[c] }
-            });
-            (last, last_albedo, colour) = (colour, albedo, better);
-            self.set_role(role, colour)?;
-            albedo = self.diffuse_albedo();
-            if near(albedo) {
-                break;
-            }
-        }
-        Ok(())
-    }
-
     /// What the parameters say in shared terms.
     pub fn canonical(&self) -> Canonical {
         let metalness = self.mean(Role::Metalness).unwrap_or(0.0);
@@ -281,23 +206,6 @@ mod tests {
         assert!(gold.tint()[0] == 1.0 && gold.tint()[2] < 0.5);
         assert_eq!(canonical("ward:specular=0.1/0.2/0.3").f0, Some([0.1, 0.2, 0.3]));
         assert_eq!(canonical("lambert").f0, None);
-    }
-
-    #[test]
-    fn diffuse_albedos_can_be_measured_and_set() {
-        let albedo = |text: &str| Material::parse(text).unwrap().diffuse_albedo()[0];
-        assert_eq!(albedo("ggx:diffuse=0.3"), 0.3);
-        // EON reflects all of a white furnace.
-        assert!((albedo("oren-nayar:variant=eon,diffuse=1,roughness=0.8") - 1.0).abs() < 5e-3);
-        for text in ["rough-plastic:alpha=0.3", "ashikhmin-shirley:f0=0.3", "disney:roughness=0.3", "openpbr"]
-        {
-            let mut material = Material::parse(text).unwrap();
-            let role = [Role::DiffuseReflectance, Role::BaseColour];
-            let role = role.into_iter().find(|role| material.by_role(*role).is_some()).unwrap();
-            material.set_diffuse_albedo(role, [0.1, 0.2, 0.3]).unwrap();
-            let found = material.diffuse_albedo();
-            assert!((0..3).all(|c| (found[c] - 0.1 * (c + 1) as f64).abs() < 1e-3), "{material}: {found:?}");
-        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use lookmatch_materials::{Material, Model, Role};
 
 use crate::RemapError;
-use crate::plan::{Body, carry_over};
+use crate::plan::{Body, SourceLook, carry_over};
 
 /// A rule that turns a source material into a target material without looking at either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl Baseline {
     /// A value that the target cannot hold.
     pub fn apply(self, source: &Material, fixed: &Material) -> Result<Option<Material>, RemapError> {
         let mut target = fixed.clone();
-        carry_over(source, &mut target, &[], Body::Copied)?;
+        carry_over(&SourceLook::new(source), &mut target, &[], Body::Copied)?;
         let look = source.canonical();
         if let Some(alpha) = look.alpha {
             target.set_alpha(alpha)?;

@@ -9,6 +9,7 @@ use lookmatch_search::{Lattice, Objective, ObjectiveError, Point};
 use lru::LruCache;
 use rayon::prelude::*;
 
+use crate::plan::SourceLook;
 use crate::stage::{Appearance, Stage};
 use crate::{Plan, RemapError};
 
@@ -76,7 +77,7 @@ pub(crate) struct Match<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) stage: &'a Stage,
     pub(crate) lattice: &'a Lattice,
-    pub(crate) source: &'a Material,
+    pub(crate) source: SourceLook<'a>,
     pub(crate) appearance: &'a Appearance,
     /// Points that were compared so far, also by an earlier search of the same source.
     pub(crate) compared: HashSet<Point>,
@@ -95,7 +96,7 @@ impl Objective for Match<'_> {
             return Err(Box::new(Stopped));
         }
         self.compared.extend(points.iter().cloned());
-        let material = |p: &Point| self.plan.target_material(self.source, &self.lattice.values(p));
+        let material = |p: &Point| self.plan.target_beside(&self.source, &self.lattice.values(p));
         let targets = points.iter().map(material).collect::<Result<Vec<_>, RemapError>>()?;
         let seen = self.stage.known_appearances(&targets);
         Ok(seen.par_iter().map(|seen| self.stage.fitness(self.appearance, seen)).collect())

@@ -1,8 +1,10 @@
 //! What a remap does, in full: models, lattices, scene, metric, strategy, search and seed.
 
+use std::sync::OnceLock;
+
 use lookmatch_imaging::Fitness;
 use lookmatch_materials::fresnel::ior_from_f0;
-use lookmatch_materials::{Levels, Material, Model, Range, Role, Scale, Value, hue};
+use lookmatch_materials::{Canonical, Levels, Material, Model, Range, Role, Scale, Value, hue};
 use lookmatch_rendering::Scene;
 use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
@@ -247,6 +249,11 @@ impl Plan {
 
     /// The target material at the given values of the target axes, beside a source: see [`carry_over`].
     pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
+        self.target_beside(&SourceLook::new(source), values)
+    }
+
+    /// [`Plan::target_material`] beside a source that is asked for more than once.
+    pub(crate) fn target_beside(&self, source: &SourceLook, values: &[f64]) -> Result<Material, RemapError> {
         let mut target = material(&self.to, &self.target_axes, values)?;
         carry_over(source, &mut target, &self.target_axes, Body::Matched)?;
         Ok(target)
@@ -262,6 +269,24 @@ pub(crate) fn material(fixed: &Material, axes: &[Axis], values: &[f64]) -> Resul
     Ok(material)
 }
 
+/// A source material with what its targets take over from it, worked out once for all of them.
+pub(crate) struct SourceLook<'a> {
+    material: &'a Material,
+    look: Canonical,
+    /// Albedo of its diffuse reflection.
+    albedo: OnceLock<[f64; 3]>,
+}
+
+impl<'a> SourceLook<'a> {
+    pub(crate) fn new(material: &'a Material) -> Self {
+        Self { material, look: material.canonical(), albedo: OnceLock::new() }
+    }
+
+    fn albedo(&self) -> [f64; 3] {
+        *self.albedo.get_or_init(|| self.material.diffuse_albedo())
+    }
+}
+
 /// How the colour of the body is carried over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Body {
@@ -274,7 +299,7 @@ pub(crate) enum Body {
 /// Sets what the search leaves alone to what the source has of it: a conductor's index, the colour of the body, the hue of
 /// the specular reflection; a metal's colour and metalness where the target has one.
 pub(crate) fn carry_over(
-    source: &Material,
+    source: &SourceLook,
     target: &mut Material,
     searched: &[Axis],
     body: Body,
@@ -282,8 +307,8 @@ pub(crate) fn carry_over(
     let taken: Vec<usize> =
         searched.iter().map(|a| target.model().resolve(&a.name)).collect::<Result<Vec<_>, _>>()?.concat();
     let is_free = |index: usize| !taken.contains(&index);
-    let look = source.canonical();
-    let metal = metal(source, target);
+    let look = &source.look;
+    let metal = metal(look, target);
     for (index, parameter) in target.model().parameters.iter().enumerate() {
         match (parameter.role, look.index) {
             (Role::ConductorIndex, Some([eta, _])) if is_free(index) => {
@@ -293,8 +318,8 @@ pub(crate) fn carry_over(
                 target.set_value(index, Value::Colour(k))?
             }
             // Layers that the source does not show stay as the target has them.
-            (role, _) if role.is_layer() && is_free(index) && source.shows(role) => {
-                if let Some(value) = source.by_role(role) {
+            (role, _) if role.is_layer() && is_free(index) && source.material.shows(role) => {
+                if let Some(value) = source.material.by_role(role) {
                     target.set_role(role, value.colour().unwrap_or([0.0; 3]))?;
                 }
             }
@@ -325,13 +350,13 @@ pub(crate) fn carry_over(
 }
 
 /// Gives the target the source's colour of the body, once all else is set.
-fn colour_body(source: &Material, target: &mut Material, role: Role, body: Body) -> Result<(), RemapError> {
+fn colour_body(source: &SourceLook, target: &mut Material, role: Role, body: Body) -> Result<(), RemapError> {
     // Two Lambert terms are the same thing.
-    let is_same = role == Role::DiffuseReflectance && source.by_role(role).is_some();
+    let is_same = role == Role::DiffuseReflectance && source.material.by_role(role).is_some();
     if is_same || body == Body::Copied {
-        return Ok(target.set_role(role, source.canonical().body)?);
+        return Ok(target.set_role(role, source.look.body)?);
     }
-    Ok(target.set_diffuse_albedo(role, source.diffuse_albedo())?)
+    Ok(target.set_diffuse_albedo(role, source.albedo())?)
 }
 
 /// A colour multiplied by a hue; any other value as it is.
@@ -343,9 +368,8 @@ fn tinted(value: &Value, hue: [f64; 3]) -> Value {
 }
 
 /// Metalness and base colour that a target takes over, where it can be a metal and is not yet, and the source is one.
-fn metal(source: &Material, target: &Material) -> Option<(f64, [f64; 3])> {
+fn metal(look: &Canonical, target: &Material) -> Option<(f64, [f64; 3])> {
     let is_dielectric = target.by_role(Role::Metalness).is_some_and(|m| m.mean() == Some(0.0));
-    let look = source.canonical();
     if !is_dielectric || look.metalness == 0.0 {
         return None;
     }
@@ -441,7 +465,7 @@ impl Draft {
     fn suit(&mut self, source: &Material) -> Result<(), RemapError> {
         let model = self.fixed.model();
         // Mostly metal: what decides the reflectance of the dielectric is hardly seen.
-        if metal(source, &self.fixed).is_some_and(|(metalness, _)| metalness > 0.5) {
+        if metal(&source.canonical(), &self.fixed).is_some_and(|(metalness, _)| metalness > 0.5) {
             let given = &self.given;
             let role = |axis: &Axis| model.parameter(&axis.name).map(|p| p.role);
             self.axes

@@ -184,7 +184,8 @@ impl Probe {
     /// The target material for values of the target axes, beside a source material.
     pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
         let mut target = plan::material(&self.to, &self.target_axes, values)?;
-        plan::carry_over(source, &mut target, &self.target_axes, plan::Body::Matched)?;
+        let source = plan::SourceLook::new(source);
+        plan::carry_over(&source, &mut target, &self.target_axes, plan::Body::Matched)?;
         Ok(target)
     }
 

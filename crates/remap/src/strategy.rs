@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::gallery::{Match, Stopped};
 use crate::journal::Journal;
+use crate::plan::SourceLook;
 use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
 
@@ -187,7 +188,8 @@ fn search_one(
     let source = plan.source_material(values)?;
     let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
     let (lattice, compared) = (problem.lattice, HashSet::new());
-    let mut objective = Match { plan, stage, lattice, source: &source, appearance, compared, stop };
+    let source = SourceLook::new(&source);
+    let mut objective = Match { plan, stage, lattice, source, appearance, compared, stop };
     let mut run = |method: &dyn Search| method.run(problem, &mut objective).map_err(RemapError::Search);
     if plan.search != "genetic" || problem.guesses.is_empty() {
         return run(&*by_name(&plan.search).map_err(RemapError::Search)?);

@@ -116,7 +116,7 @@ fn markdown() -> String {
             model.name,
             model.title,
             if model.is_reciprocal { "yes" } else { "no" },
-            format!("{}", model.largest_albedo),
+            model.largest_albedo,
             codes(model.surveyed, "one material"),
             codes(model.searched, "no target"),
         );
