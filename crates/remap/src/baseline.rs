@@ -34,7 +34,7 @@ impl Baseline {
     /// A value that the target cannot hold.
     pub fn apply(self, source: &Material, fixed: &Material) -> Result<Option<Material>, RemapError> {
         let mut target = fixed.clone();
-        carry_over(&SourceLook::new(source), &mut target, &[], Body::Copied)?;
+        carry_over(&SourceLook::new(source), &mut target, (&[], &[]), Body::Copied)?;
         let look = source.canonical();
         if let Some(alpha) = look.alpha {
             target.set_alpha(alpha)?;

@@ -148,6 +148,9 @@ pub struct Plan {
     pub strategy: Strategy,
     /// Name of the search method.
     pub search: String,
+    /// Target parameters that the user fixed: they take nothing over from the source.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held: Vec<String>,
     /// Target ranges.
     pub preset: Option<Preset>,
     /// Seed of every random decision.
@@ -233,6 +236,7 @@ impl Plan {
             target_axes: target.axes,
             strategy: options.strategy,
             search: options.search.clone(),
+            held: target.held.iter().map(|name| (*name).to_owned()).collect(),
             preset: options.preset,
             seed: options.seed,
             metric: Fitness::default(),
@@ -255,7 +259,7 @@ impl Plan {
     /// [`Plan::target_material`] beside a source that is asked for more than once.
     pub(crate) fn target_beside(&self, source: &SourceLook, values: &[f64]) -> Result<Material, RemapError> {
         let mut target = material(&self.to, &self.target_axes, values)?;
-        carry_over(source, &mut target, &self.target_axes, Body::Matched)?;
+        carry_over(source, &mut target, (&self.target_axes, &self.held), Body::Matched)?;
         Ok(target)
     }
 }
@@ -275,15 +279,26 @@ pub(crate) struct SourceLook<'a> {
     look: Canonical,
     /// Albedo of its diffuse reflection.
     albedo: OnceLock<[f64; 3]>,
+    is_rounded: bool,
 }
+
+/// Steps of an albedo from 0 to 1 that targets are given while they are searched.
+const ALBEDOS: f64 = 64.0;
 
 impl<'a> SourceLook<'a> {
     pub(crate) fn new(material: &'a Material) -> Self {
-        Self { material, look: material.canonical(), albedo: OnceLock::new() }
+        Self { material, look: material.canonical(), albedo: OnceLock::new(), is_rounded: false }
+    }
+
+    /// With a rounded albedo: the targets of many sources then have the same few bodies, and need not be rendered for each. A
+    /// body a little too bright or too dark is so in all targets of a source alike.
+    pub(crate) fn rounded(material: &'a Material) -> Self {
+        Self { is_rounded: true, ..Self::new(material) }
     }
 
     fn albedo(&self) -> [f64; 3] {
-        *self.albedo.get_or_init(|| self.material.diffuse_albedo())
+        let round = |v: f64| if self.is_rounded { (v * ALBEDOS).round() / ALBEDOS } else { v };
+        *self.albedo.get_or_init(|| self.material.diffuse_albedo().map(round))
     }
 }
 
@@ -296,17 +311,22 @@ pub(crate) enum Body {
     Matched,
 }
 
-/// Sets what the search leaves alone to what the source has of it: a conductor's index, the colour of the body, the hue of
+/// Sets what the search and the user leave alone to what the source has of it: a conductor's index, the colour of the body, the hue of
 /// the specular reflection; a metal's colour and metalness where the target has one.
 pub(crate) fn carry_over(
     source: &SourceLook,
     target: &mut Material,
-    searched: &[Axis],
+    (searched, held): (&[Axis], &[String]),
     body: Body,
 ) -> Result<(), RemapError> {
-    let taken: Vec<usize> =
-        searched.iter().map(|a| target.model().resolve(&a.name)).collect::<Result<Vec<_>, _>>()?.concat();
-    let is_free = |index: usize| !taken.contains(&index);
+    let model = target.model();
+    let indices = |names: &mut dyn Iterator<Item = &String>| -> Result<Vec<usize>, RemapError> {
+        Ok(names.map(|name| model.resolve(name)).collect::<Result<Vec<_>, _>>()?.concat())
+    };
+    let searched = indices(&mut searched.iter().map(|axis| &axis.name))?;
+    let held = indices(&mut held.iter())?;
+    let is_searched = |index: usize| searched.contains(&index);
+    let is_free = |index: usize| !is_searched(index) && !held.contains(&index);
     let look = &source.look;
     let metal = metal(look, target);
     for (index, parameter) in target.model().parameters.iter().enumerate() {
@@ -324,11 +344,11 @@ pub(crate) fn carry_over(
                 }
             }
             // A searched colour is one number: it takes the hue of the source's.
-            (Role::DiffuseReflectance | Role::BaseColour, _) if !is_free(index) => {
+            (Role::DiffuseReflectance | Role::BaseColour, _) if is_searched(index) => {
                 target.set_value(index, tinted(&target.values()[index], hue(look.body)))?;
             }
             (Role::SpecularReflectance | Role::NormalReflectance | Role::LobeHeight, _)
-                if !is_free(index) =>
+                if is_searched(index) =>
             {
                 target.set_value(index, tinted(&target.values()[index], look.tint()))?;
             }
@@ -351,10 +371,15 @@ pub(crate) fn carry_over(
 
 /// Gives the target the source's colour of the body, once all else is set.
 fn colour_body(source: &SourceLook, target: &mut Material, role: Role, body: Body) -> Result<(), RemapError> {
-    // Two Lambert terms are the same thing.
-    let is_same = role == Role::DiffuseReflectance && source.material.by_role(role).is_some();
-    if is_same || body == Body::Copied {
-        return Ok(target.set_role(role, source.look.body)?);
+    // Two Lambert terms are the same thing, and so are the bodies of one model.
+    let same = source.material.by_role(role).and_then(|v| v.colour());
+    let is_same_model = std::ptr::eq(source.material.model(), target.model());
+    match same {
+        Some(colour) if is_same_model || role == Role::DiffuseReflectance => {
+            return Ok(target.set_role(role, colour)?);
+        }
+        _ if body == Body::Copied => return Ok(target.set_role(role, source.look.body)?),
+        _ => {}
     }
     Ok(target.set_diffuse_albedo(role, source.albedo())?)
 }
@@ -657,6 +682,40 @@ mod tests {
         let brushed = Assignment { side: None, name: "roughness_u".into(), value: "0.05".into() };
         let options = Options { fix: vec![brushed], ..Options::default() };
         assert_eq!(names(&plan("ward", "ggx", &options)), ["specular", "ior", "roughness_u", "roughness_v"]);
+    }
+
+    #[test]
+    fn what_the_user_fixes_takes_nothing_over() {
+        let fix = Assignment { side: Some(Side::Target), name: "diffuse".into(), value: "0.2".into() };
+        let plan = plan("ward", "ggx", &Options { fix: vec![fix], ..Options::default() });
+        let source = Material::parse("ward:diffuse=0.7").unwrap();
+        assert_eq!(plan.target_material(&source, &[1.0, 1.5, 0.2]).unwrap().number("diffuse").unwrap(), 0.2);
+    }
+
+    #[test]
+    fn layers_metals_and_bodies_are_carried_over() {
+        let target = |from: &str, to: &str| {
+            let source = Material::parse(from).unwrap();
+            let model = |m: &Material| m.model();
+            let to = Material::parse(to).unwrap();
+            let plan = Plan::new(model(&source), model(&to), &Options::default()).unwrap();
+            let values: Vec<f64> = plan.target_axes.iter().map(|a| a.value(a.len() / 2)).collect();
+            plan.target_material(&source, &values).unwrap()
+        };
+        let coated = target("openpbr:coat_weight=0.5,coat_roughness=0.3,base_color=0.2/0.4/0.6", "gltf");
+        assert_eq!(
+            (coated.number("clearcoat").unwrap(), coated.number("clearcoat_roughness").unwrap()),
+            (0.5, 0.3)
+        );
+        let gold = target("ggx-conductor:conductor=gold", "usd-preview-surface");
+        assert_eq!(gold.number("metallic").unwrap(), 1.0);
+        assert!(gold.by_role(Role::BaseColour).unwrap().colour().unwrap()[2] < 0.5, "{gold}");
+        // Under an interface a body must be brighter to look the same.
+        let plastic = target("ggx:diffuse=0.5", "rough-plastic");
+        assert!(
+            (plastic.diffuse_albedo()[0] - 0.5).abs() < 2e-3 && plastic.canonical().body[0] > 0.55,
+            "{plastic}"
+        );
     }
 
     #[test]

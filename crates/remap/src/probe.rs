@@ -32,6 +32,9 @@ pub struct Probe {
     pub source_axes: Vec<Axis>,
     /// Searched target parameters.
     pub target_axes: Vec<Axis>,
+    /// Target parameters that took nothing over from the source, because the user fixed them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held: Vec<String>,
     /// How neighbours were used.
     pub strategy: Strategy,
     /// Search method.
@@ -107,6 +110,7 @@ impl Probe {
             to: plan.to.clone(),
             source_axes: plan.source_axes.clone(),
             target_axes: plan.target_axes.clone(),
+            held: plan.held.clone(),
             strategy: plan.strategy,
             search: plan.search.clone(),
             preset: plan.preset,
@@ -185,7 +189,8 @@ impl Probe {
     pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
         let mut target = plan::material(&self.to, &self.target_axes, values)?;
         let source = plan::SourceLook::new(source);
-        plan::carry_over(&source, &mut target, &self.target_axes, plan::Body::Matched)?;
+        let taken = (&self.target_axes[..], &self.held[..]);
+        plan::carry_over(&source, &mut target, taken, plan::Body::Matched)?;
         Ok(target)
     }
 

@@ -188,9 +188,17 @@ fn search_one(
     let source = plan.source_material(values)?;
     let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
     let (lattice, compared) = (problem.lattice, HashSet::new());
-    let source = SourceLook::new(&source);
-    let mut objective = Match { plan, stage, lattice, source, appearance, compared, stop };
-    let mut run = |method: &dyn Search| method.run(problem, &mut objective).map_err(RemapError::Search);
+    let look = SourceLook::rounded(&source);
+    let mut objective = Match { plan, stage, lattice, source: look, appearance, compared, stop };
+    let found = searched(plan, problem, &mut objective)?;
+    let target = plan.target_material(&source, &lattice.values(&found.best))?;
+    let seen = stage.known_appearances(&[target]).swap_remove(0);
+    Ok(Outcome { fitness: stage.fitness(appearance, &seen), ..found })
+}
+
+/// Runs the search method of a plan.
+fn searched(plan: &Plan, problem: &Problem, objective: &mut Match) -> Result<Outcome, RemapError> {
+    let mut run = |method: &dyn Search| method.run(problem, objective).map_err(RemapError::Search);
     if plan.search != "genetic" || problem.guesses.is_empty() {
         return run(&*by_name(&plan.search).map_err(RemapError::Search)?);
     }
