@@ -175,7 +175,7 @@ const EQUAL_STEPS: f64 = 4.45;
 const SCALE_STEP: f64 = 0.02;
 
 /// Levels of a source axis in a quick remap, at most.
-const QUICK_LEVELS: usize = 6;
+const QUICK_LEVELS: usize = 5;
 
 impl Plan {
     /// Works out the lattices of a remap from one model to another.
