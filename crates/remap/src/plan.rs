@@ -713,7 +713,7 @@ mod tests {
         // Under an interface a body must be brighter to look the same.
         let plastic = target("ggx:diffuse=0.5", "rough-plastic");
         assert!(
-            (plastic.diffuse_albedo()[0] - 0.5).abs() < 2e-3 && plastic.canonical().body[0] > 0.55,
+            (plastic.diffuse_albedo()[0] - 0.5).abs() < 2e-3 && plastic.canonical().body[0] > 0.51,
             "{plastic}"
         );
     }
