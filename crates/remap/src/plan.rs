@@ -251,7 +251,7 @@ impl Plan {
         material(&self.from, &self.source_axes, values)
     }
 
-    /// The target material at the given values of the target axes, beside a source: see [`carry_over`].
+    /// The target material at the given values of the target axes, beside a source: what is not searched is taken over from it.
     pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
         self.target_beside(&SourceLook::new(source), values)
     }
