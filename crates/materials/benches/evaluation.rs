@@ -1,4 +1,4 @@
-//! What one evaluation costs, and building a BSDF, for every model of the catalogue: `cargo bench -p lookmatch-materials` writes
+//! What one evaluation costs, and building a BSDF, for every model of the catalogue: `cargo bench -p lookmatch-materials --bench evaluation` writes
 //! `docs/results/evaluation.md` to standard output. One thread, single precision, whole tables of geometries as the renderer
 //! evaluates them; the fastest of several runs.
 //!
@@ -76,7 +76,7 @@ fn main() {
     let floor = evaluation(&bare_ggx(), &geometries);
     println!("# What one evaluation costs\n");
     println!(
-        "Written by `cargo bench -p lookmatch-materials`: one thread, single precision, {} geometries at once, fastest",
+        "Written by `cargo bench -p lookmatch-materials --bench evaluation`: one thread, single precision, {} geometries at once, fastest",
         geometries.len()
     );
     println!(
