@@ -3,7 +3,7 @@
 use lookmatch_materials::{Material, Model, Role};
 
 use crate::RemapError;
-use crate::plan::{Body, SourceLook, carry_over};
+use crate::carry::{Body, SourceLook, carry_over};
 
 /// A rule that turns a source material into a target material without looking at either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use lookmatch_search::{Lattice, Objective, ObjectiveError, Point};
 use lru::LruCache;
 use rayon::prelude::*;
 
-use crate::plan::SourceLook;
+use crate::carry::SourceLook;
 use crate::stage::{Appearance, Stage};
 use crate::{Plan, RemapError};
 

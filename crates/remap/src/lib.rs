@@ -7,6 +7,7 @@
 
 mod apply;
 mod baseline;
+mod carry;
 mod error;
 mod gallery;
 mod journal;

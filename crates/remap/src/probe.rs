@@ -8,6 +8,7 @@ use lookmatch_rendering::Scene;
 use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
 
+use crate::carry::{Body, SourceLook, carry_over};
 use crate::plan::{Plan, Preset, Strategy};
 use crate::{RemapError, plan};
 
@@ -188,9 +189,9 @@ impl Probe {
     /// The target material for values of the target axes, beside a source material.
     pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
         let mut target = plan::material(&self.to, &self.target_axes, values)?;
-        let source = plan::SourceLook::new(source);
+        let source = SourceLook::new(source);
         let taken = (&self.target_axes[..], &self.held[..]);
-        plan::carry_over(&source, &mut target, taken, plan::Body::Matched)?;
+        carry_over(&source, &mut target, taken, Body::Matched)?;
         Ok(target)
     }
 

@@ -9,9 +9,9 @@ use lookmatch_search::{
 };
 use rayon::prelude::*;
 
+use crate::carry::SourceLook;
 use crate::gallery::{Match, Stopped};
 use crate::journal::Journal;
-use crate::plan::SourceLook;
 use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
 
