@@ -55,6 +55,14 @@ mod tests {
     }
 
     #[test]
+    fn a_metal_is_a_conductor_where_that_is_a_choice() {
+        for name in ["cook-torrance", "ashikhmin-shirley", "kulla-conty"] {
+            let gold = Material::parse(&format!("{name}:conductor=gold")).unwrap();
+            assert!(gold.is_conductor() && gold.canonical().f0.unwrap()[2] < 0.6, "{gold}");
+        }
+    }
+
+    #[test]
     fn names_set_both_parts_of_the_index() {
         for name in ["ggx-conductor", "beckmann-conductor", "as"] {
             let read = |text: &str| Material::parse(&format!("{name}:{text}"));

@@ -79,7 +79,7 @@ pub static MODEL: Model = Model {
         ),
     ],
     aliases: &[Alias { name: "exponent", parameters: &["exponent_u", "exponent_v"] }],
-    named: &[CONDUCTOR],
+    named: &[CHOSEN_CONDUCTOR],
     surveyed: &["f0", "exponent"],
     searched: &["f0", "exponent"],
     presets: presets::ashikhmin_shirley,

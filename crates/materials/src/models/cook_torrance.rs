@@ -70,7 +70,7 @@ pub static MODEL: Model = Model {
             kind: Kind::Choice { options: &["modern", "1982", "pi"] },
         },
     ],
-    named: &[CONDUCTOR],
+    named: &[CHOSEN_CONDUCTOR],
     surveyed: &["ior", "roughness"],
     searched: &["specular", "ior", "roughness"],
     presets: presets::cook_torrance,

@@ -77,6 +77,7 @@ pub static MODEL: Model = Model {
             kind: Kind::Choice { options: &["schlick", "dielectric", "conductor"] },
         },
     ],
+    named: &[CHOSEN_CONDUCTOR],
     surveyed: &["f0", "roughness"],
     searched: &["f0", "roughness"],
     build: |v: &Values| {

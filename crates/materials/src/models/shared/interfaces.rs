@@ -93,6 +93,16 @@ pub(in crate::models) const CONDUCTOR: Named = Named {
     look_up: |name| metals::by_name(name).map(|m| vec![Value::Colour(m.eta), Value::Colour(m.k)]),
 };
 
+/// [`CONDUCTOR`] where the Fresnel term is a choice: a metal's name makes it.
+pub(in crate::models) const CHOSEN_CONDUCTOR: Named = Named {
+    parameters: &["eta", "k", "fresnel"],
+    look_up: |name| {
+        let metal = metals::by_name(name)?;
+        Some(vec![Value::Colour(metal.eta), Value::Colour(metal.k), Value::Choice("conductor")])
+    },
+    ..CONDUCTOR
+};
+
 /// The Fresnel term of a model with `eta` and `k`.
 pub(in crate::models) fn conductor(v: &Values) -> [Fresnel; 3] {
     let (eta, k) = (v.colour("eta"), v.colour("k"));
