@@ -245,12 +245,18 @@ fn read_events(stdout: ChildStdout, inbox: &SyncSender<Event>, most_bytes: &Atom
 }
 
 fn read_event(stdout: &mut impl BufRead, most_bytes: &AtomicUsize) -> Event {
+    match stdout.fill_buf() {
+        Ok([]) | Err(_) => return Event::Ended,
+        Ok([b'{', ..]) => (),
+        // What is no message may have no end either.
+        Ok(garbage) => return Event::Garbage(unexpected(garbage)),
+    }
     let line = match read_line(stdout, LONGEST_LINE) {
         Ok(line) if !line.is_empty() => line,
         _ => return Event::Ended,
     };
     let Ok(message) = serde_json::from_slice::<Map<String, Value>>(&line) else {
-        return Event::Garbage(format!("'{}'; expected a JSON object on a line", excerpt(&line)));
+        return Event::Garbage(unexpected(&line));
     };
     let bytes = match message.get("bytes") {
         None => 0,
@@ -275,10 +281,11 @@ fn read_line(from: &mut impl BufRead, longest: usize) -> io::Result<Vec<u8>> {
     Ok(line)
 }
 
-/// The beginning of a line for a message.
-fn excerpt(line: &[u8]) -> String {
+/// What came in place of a message: its beginning.
+fn unexpected(output: &[u8]) -> String {
+    let line = output.split(|byte| *byte == b'\n').next().unwrap_or_default();
     let text = String::from_utf8_lossy(&line[..line.len().min(200)]);
-    text.trim_end().escape_debug().to_string()
+    format!("'{}'; expected a JSON object on a line", text.escape_debug())
 }
 
 /// Keeps the last lines of the log, and copies all of it to a file; each line says which process wrote it.
