@@ -31,7 +31,7 @@ def _watch(stdin):
     while not poll.poll(500):
         if os.getppid() != parent:
             os._exit(0)
-    for _ in range(20):
+    for _ in range(10):
         if os.getppid() != parent:
             os._exit(0)
         select.select([], [], [], 0.1)

@@ -64,22 +64,34 @@ impl EnvironmentMap {
 
     /// The map of a light from its [`EnvironmentMap::content`].
     pub(crate) fn decode(light: &EnvironmentLight, content: &[u8]) -> Result<Self, SceneError> {
-        let image = match light.map.as_str() {
-            "designed" => designed_map(),
-            "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), content)?,
-            path => lookmatch_imaging::decode(Path::new(path), content)?,
+        Ok(Self::new(&decode_image(light, content)?, light.scale, light.rotation))
+    }
+
+    /// The map that a scene names as other renderers are given it: scaled, turned, nothing negative, and averaged down to
+    /// `most` columns where it has more. A turn by a part of a texel interpolates between columns.
+    ///
+    /// # Errors
+    /// Where the file cannot be read as an image, or is not twice as wide as high.
+    pub fn image(light: &EnvironmentLight, most: usize) -> Result<Image, SceneError> {
+        let image = decode_image(light, &Self::content(light)?)?;
+        let (width, height) = (image.width(), image.height());
+        let texels = scaled(&image, light.scale);
+        let pyramid = Pyramid::new(width, height, texels, true, |v| (PI * v).sin());
+        let (width, height, texels) = pyramid.level_within(most);
+        let shift = (light.rotation / 360.0).rem_euclid(1.0) * width as f64;
+        let (whole, part) = (shift.floor(), shift.fract() as f32);
+        let turned = |x: usize, y: usize| {
+            let column = |x: usize| texels[y * width + x % width];
+            // Two turns more than the shift, so that nothing is below 0.
+            let right = x + 2 * width - whole as usize;
+            column(right).lerp(column(right - 1), part)
         };
-        if image.width() != 2 * image.height() {
-            let (width, height) = (image.width(), image.height());
-            return Err(SceneError::Aspect { map: light.map.clone(), width, height });
-        }
-        Ok(Self::new(&image, light.scale, light.rotation))
+        Ok(Image::from_fn(width, height, |x, y| turned(x, y).truncate().to_array()))
     }
 
     /// Prepares a 2:1 image. Negative values, which compression leaves in some published maps, count as 0.
     pub(crate) fn new(image: &Image, scale: f64, rotation: f64) -> Self {
-        let texel = |p: &[f32; 3]| Rgb::new(p[0], p[1], p[2], 0.0).max(Rgb::ZERO) * scale as f32;
-        let texels: Vec<Rgb> = image.pixels().iter().map(texel).collect();
+        let texels = scaled(image, scale);
         let (width, height) = (image.width(), image.height());
         let rotation = (rotation / 360.0).rem_euclid(1.0);
         let grid = Grid { width, height, rotation };
@@ -120,6 +132,26 @@ impl EnvironmentMap {
         let texels = angle as f32 * pyramid.height() as f32 / PI as f32;
         pyramid.sample(u, v, texels)
     }
+}
+
+/// The image of a light from its [`EnvironmentMap::content`].
+fn decode_image(light: &EnvironmentLight, content: &[u8]) -> Result<Image, SceneError> {
+    let image = match light.map.as_str() {
+        "designed" => designed_map(),
+        "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), content)?,
+        path => lookmatch_imaging::decode(Path::new(path), content)?,
+    };
+    if image.width() != 2 * image.height() {
+        let (width, height) = (image.width(), image.height());
+        return Err(SceneError::Aspect { map: light.map.clone(), width, height });
+    }
+    Ok(image)
+}
+
+/// An image's pixels times a factor; negative ones count as 0.
+fn scaled(image: &Image, scale: f64) -> Vec<Rgb> {
+    let texel = |p: &[f32; 3]| Rgb::new(p[0], p[1], p[2], 0.0).max(Rgb::ZERO) * scale as f32;
+    image.pixels().iter().map(texel).collect()
 }
 
 /// The texels of a latitude-longitude map as directions.
@@ -254,6 +286,26 @@ mod tests {
         assert!(map.radiance(DVec3::Y, 0.0).y < 0.01, "+Y is the first row");
         let turned = EnvironmentMap::new(&image, 2.0, 90.0);
         assert!((turned.radiance(DVec3::Z, 0.0).x - 2.0 * 15.5).abs() < 0.02, "what was at +X is at +Z");
+    }
+
+    #[test]
+    fn images_for_other_renderers_are_scaled_turned_and_small() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("map.exr");
+        let columns = Image::from_fn(8, 4, |x, _| [x as f32, 0.0, -1.0]);
+        lookmatch_imaging::write(&file, &columns, &[]).unwrap();
+        let map = file.to_string_lossy();
+        let image = |rotation, most| {
+            let light = EnvironmentLight { scale: 2.0, rotation, ..EnvironmentLight::of(map.clone()) };
+            EnvironmentMap::image(&light, most).unwrap()
+        };
+        let first_row = |image: &Image| (0..image.width()).map(|x| image.get(x, 0)[0]).collect::<Vec<_>>();
+        assert_eq!(first_row(&image(0.0, 8)), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]);
+        // A quarter of a turn is two columns: what was at the left edge, −Z, is at +X.
+        assert_eq!(first_row(&image(90.0, 8)), [12.0, 14.0, 0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+        assert_eq!(first_row(&image(-22.5, 8))[..3], [1.0, 3.0, 5.0]);
+        assert_eq!(first_row(&image(0.0, 4)), [1.0, 5.0, 9.0, 13.0]);
+        assert_eq!(image(0.0, 8).get(3, 1), [6.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -38,6 +38,13 @@ impl Pyramid {
         self.levels[0].height
     }
 
+    /// Width, height and texels of the finest level that has at most this many columns, or of the coarsest.
+    pub(crate) fn level_within(&self, most: usize) -> (usize, usize, &[Rgb]) {
+        let level = self.levels.iter().position(|level| level.width <= most);
+        let level = &self.levels[level.unwrap_or(self.levels.len() - 1)];
+        (level.width, level.height, &level.texels)
+    }
+
     /// Bilinear look-up at `u, v` in `[0, 1]` in one level, or the coarsest.
     #[inline(always)]
     pub(crate) fn at_level(&self, u: f32, v: f32, level: u32) -> Rgb {

@@ -261,7 +261,10 @@ impl Scene {
     }
 
     /// Checks that a picture can be rendered: every field, the size in pixels, and that there is light.
-    pub(crate) fn check_picture(&self, illumination: Illumination, size: usize) -> Result<(), SceneError> {
+    ///
+    /// # Errors
+    /// The first field that is wrong, or what is missing.
+    pub fn check_picture(&self, illumination: Illumination, size: usize) -> Result<(), SceneError> {
         self.check()?;
         if !(1..=8192).contains(&size) {
             return Err(SceneError::Size { size });
