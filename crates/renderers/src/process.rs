@@ -98,7 +98,16 @@ impl Process {
         thread::spawn(move || write_requests(stdin, &outbox));
         thread::spawn(move || read_events(stdout, &inbox, &limit));
         let listener = thread::spawn(move || listen(stderr, &words, log, id));
-        Ok(Self { child, requests: Some(requests), events, most_bytes, last_words, listener, mark, ended: None })
+        Ok(Self {
+            child,
+            requests: Some(requests),
+            events,
+            most_bytes,
+            last_words,
+            listener,
+            mark,
+            ended: None,
+        })
     }
 
     /// The process's number.

@@ -164,7 +164,8 @@ fn render(id: &Value, size: u64, material: &Value) {
             exit(0)
         }
         "no-bytes" => {
-            let answer = json!({"id": id, "width": size, "height": size, "samples": 1, "cpu_s": 0, "wall_s": 0});
+            let answer =
+                json!({"id": id, "width": size, "height": size, "samples": 1, "cpu_s": 0, "wall_s": 0});
             say(&answer, &[]);
         }
         "nan" => picture(size, f32::NAN),
@@ -197,11 +198,8 @@ fn render(id: &Value, size: u64, material: &Value) {
 
 /// Renders on a worker that hangs.
 fn tool(program: &str, arguments: &[String]) {
-    let launch = Launch {
-        program: program.into(),
-        args: arguments.iter().map(Into::into).collect(),
-        env: Vec::new(),
-    };
+    let launch =
+        Launch { program: program.into(), args: arguments.iter().map(Into::into).collect(), env: Vec::new() };
     let pool = Pool::start(launch, PoolOptions::default(), Arc::new(|| false)).unwrap();
     pool.scene("lit", &Scene::reference(), Illumination::Point, 8).unwrap();
     let Value::Object(values) = json!({"mode": "hang"}) else { unreachable!() };
