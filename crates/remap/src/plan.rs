@@ -124,7 +124,8 @@ impl Endpoint {
         Ok(if text.contains('@') { Self::Named(material) } else { Self::Model(material.model()) })
     }
 
-    fn model(&self) -> &'static Model {
+    /// Its model.
+    pub fn model(&self) -> &'static Model {
         match self {
             Self::Model(model) => model,
             Self::Named(material) => material.model(),

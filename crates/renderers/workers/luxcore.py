@@ -176,7 +176,7 @@ MODELS = [
     model(
         "roughmatte", "Rough matte", "Oren-Nayar.", False, ["sigma"],
         colour("kd", "diffuse-reflectance", BODY),
-        number("sigma", "diffuse-roughness", 20.0, (0.0, 90.0), unit="°", search=(0.0, 60.0, 1.0), survey=(0.0, 60.0, 7.5)),
+        number("sigma", "diffuse-roughness", 0.35, (0.0, 1.5), unit="rad", search=(0.0, 1.0, 0.02), survey=(0.0, 1.0, 0.125)),
     ),
     model(
         "glossy2", "Glossy", "Schlick's coating, a GGX-like lobe, above a body that gets what it lets through.",
