@@ -11,11 +11,11 @@ use std::time::Duration;
 use lookmatch_rendering::{Illumination, Scene};
 use serde_json::{Map, Value};
 
+use crate::RendererError;
 use crate::hello::{Hello, Threads};
 use crate::process::{Launch, lock};
 use crate::scene::SceneData;
 use crate::worker::{Picture, Worker};
-use crate::RendererError;
 
 /// After this many failures in a row, no more workers are started.
 const MOST_FAILURES: u32 = 5;
@@ -188,7 +188,8 @@ impl Pool {
         };
         let mut results: Vec<_> = thread::scope(|scope| {
             let threads: Vec<_> = (0..self.seat_count.min(jobs.len())).map(|_| scope.spawn(work)).collect();
-            let joined = threads.into_iter().map(|t| t.join().unwrap_or_else(|p| std::panic::resume_unwind(p)));
+            let joined =
+                threads.into_iter().map(|t| t.join().unwrap_or_else(|p| std::panic::resume_unwind(p)));
             joined.flatten().collect()
         });
         results.sort_by_key(|(k, _)| *k);
@@ -364,7 +365,11 @@ impl Drop for Taken<'_> {
         let seat = std::mem::take(&mut self.seat);
         let mut seats = lock(&self.pool.seats);
         // Running workers are taken first.
-        if seat.worker.is_some() { seats.push_back(seat) } else { seats.push_front(seat) }
+        if seat.worker.is_some() {
+            seats.push_back(seat)
+        } else {
+            seats.push_front(seat)
+        }
         self.pool.seat_freed.notify_one();
     }
 }

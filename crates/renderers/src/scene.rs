@@ -6,8 +6,8 @@ use lookmatch_imaging::Image;
 use lookmatch_rendering::{EnvironmentMap, Illumination, Scene};
 use serde_json::{Map, Value, json};
 
-use crate::hello::{Hello, Light};
 use crate::RendererError;
+use crate::hello::{Hello, Light};
 
 /// The widest map that the protocol allows.
 const WIDEST_MAP: usize = 4096;

@@ -74,10 +74,11 @@ impl Worker {
         stop: Watch<'_>,
     ) -> Result<(Self, Hello), RendererError> {
         let label = launch.label();
-        let process = Process::start(launch, options.log.as_deref()).map_err(|error| RendererError::Start {
-            renderer: label.clone(),
-            reason: describe_start(&launch.program, options.log.as_deref(), &error),
-        })?;
+        let process =
+            Process::start(launch, options.log.as_deref()).map_err(|error| RendererError::Start {
+                renderer: label.clone(),
+                reason: describe_start(&launch.program, options.log.as_deref(), &error),
+            })?;
         let mut worker = Self {
             process,
             label,
@@ -224,7 +225,8 @@ impl Drop for Worker {
 
 /// Why a worker could not be run: its program or its log.
 fn describe_start(program: &Path, log: Option<&Path>, error: &std::io::Error) -> String {
-    let unwritable = log.filter(|log| std::fs::OpenOptions::new().create(true).append(true).open(log).is_err());
+    let unwritable =
+        log.filter(|log| std::fs::OpenOptions::new().create(true).append(true).open(log).is_err());
     match unwritable {
         Some(log) => format!("its log '{}' cannot be written: {error}", log.display()),
         None => format!("'{}': {error}", program.display()),
@@ -281,7 +283,10 @@ fn image(data: &[u8], scene: &SceneData) -> Result<Image, Cause> {
     let (pixels, odd) = numbers.as_chunks::<3>();
     if pixels.len() != size * size || !odd.is_empty() || !rest.is_empty() {
         let expected = 12 * size * size;
-        return Err(Cause::Answer(format!("bytes is {}; expected {expected} of {size} x {size} pixels", data.len())));
+        return Err(Cause::Answer(format!(
+            "bytes is {}; expected {expected} of {size} x {size} pixels",
+            data.len()
+        )));
     }
     if let Some(first) = numbers.iter().position(|value| !value.is_finite()) {
         let count = numbers.iter().filter(|value| !value.is_finite()).count();

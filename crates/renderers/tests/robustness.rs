@@ -181,7 +181,8 @@ fn hanging() {
 
 #[test]
 fn output_that_is_no_protocol() {
-    fails_alone("garbage", &["'Saved: /tmp/picture.png'; expected a JSON object", "last words: saving"]).close();
+    fails_alone("garbage", &["'Saved: /tmp/picture.png'; expected a JSON object", "last words: saving"])
+        .close();
     fails_alone("binary", &["is not the protocol"]).close();
     fails_alone("wrong-id", &["answered request 4711; expected an answer to"]).close();
 }
@@ -343,17 +344,22 @@ fn renderers_that_do_not_start_say_why() {
     assert!(other.contains("protocol is 2; this lookmatch speaks version 1"), "{other}");
     let name = message("odd-name");
     assert!(name.contains("name is 'Fake Renderer'; expected lower case"), "{name}");
-    let late = start_error("hangs-at-start", PoolOptions { start_limit: Duration::from_secs(1), ..options() });
+    let late =
+        start_error("hangs-at-start", PoolOptions { start_limit: Duration::from_secs(1), ..options() });
     let RendererError::Request(failure) = late else { panic!("{late}") };
     assert_eq!(failure.cause, Cause::Silent { seconds: 1.0 });
     let missing = Launch { program: "/no/such/program".into(), args: Vec::new(), env: Vec::new() };
     let missing = Pool::start(missing, options(), never()).err().unwrap().to_string();
-    assert!(missing.contains("cannot start renderer 'program': '/no/such/program': No such file"), "{missing}");
+    assert!(
+        missing.contains("cannot start renderer 'program': '/no/such/program': No such file"),
+        "{missing}"
+    );
 }
 
 #[test]
 fn a_slow_start_is_waited_for() {
-    let studio = Studio::new("slow-start", PoolOptions { time_limit: Duration::from_millis(500), ..options() });
+    let studio =
+        Studio::new("slow-start", PoolOptions { time_limit: Duration::from_millis(500), ..options() });
     studio.one(json!({})).unwrap();
     studio.close();
 }
@@ -366,7 +372,10 @@ fn a_renderer_that_only_fails_is_given_up() {
     assert_eq!(results.iter().map(is_given_up).collect::<Vec<_>>()[..5], [false; 5]);
     assert!(results[5..].iter().all(is_given_up));
     let message = results[7].as_ref().unwrap_err().to_string();
-    assert!(message.contains("given up after 5 failures in a row; the last one: renderer 'fake'"), "{message}");
+    assert!(
+        message.contains("given up after 5 failures in a row; the last one: renderer 'fake'"),
+        "{message}"
+    );
     assert_eq!(studio.notes("start").len(), 10);
     studio.close();
 }
@@ -395,7 +404,8 @@ fn what_makes_no_sense_is_not_asked_for() {
     assert!(message(&|j| j.model = "glass".into()).contains("model is 'glass'; expected fake"));
     assert!(message(&|j| j.samples = 0).contains("samples is 0; expected 1 or more"));
     assert!(message(&|j| j.seed = u32::MAX).contains("seed is 4294967295; expected 0 to 2147483647"));
-    let scene = |name, scene: &Scene, light| studio.pool.scene(name, scene, light, 8).unwrap_err().to_string();
+    let scene =
+        |name, scene: &Scene, light| studio.pool.scene(name, scene, light, 8).unwrap_err().to_string();
     let dark = scene("sky", &Scene::reference(), Illumination::Environment);
     assert!(dark.contains("it is lit by an environment; expected point lights alone"), "{dark}");
     let own = scene("three", &Scene::spheres(), Illumination::Point);

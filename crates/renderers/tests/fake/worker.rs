@@ -143,11 +143,12 @@ fn render(id: &Value, size: u64, material: &Value) {
         }
         "hang-with-children" => {
             // One in the group of the worker, and one in a group of its own, as browsers are.
-            Command::new("sleep").arg("3600").spawn().unwrap();
+            let mut beside = Command::new("sleep").arg("3600").spawn().unwrap();
             let mut alone = Command::new("sleep");
             std::os::unix::process::CommandExt::process_group(&mut alone, 0);
-            note(&format!("alone {}", alone.arg("3600").spawn().unwrap().id()));
-            sleep(Duration::from_secs(3600));
+            let mut alone = alone.arg("3600").spawn().unwrap();
+            note(&format!("alone {}", alone.id()));
+            beside.wait().and(alone.wait()).unwrap();
         }
         "garbage" => {
             eprintln!("saving");
@@ -164,7 +165,8 @@ fn render(id: &Value, size: u64, material: &Value) {
             exit(0)
         }
         "no-bytes" => {
-            let answer = json!({"id": id, "width": size, "height": size, "samples": 1, "cpu_s": 0, "wall_s": 0});
+            let answer =
+                json!({"id": id, "width": size, "height": size, "samples": 1, "cpu_s": 0, "wall_s": 0});
             say(&answer, &[]);
         }
         "nan" => picture(size, f32::NAN),
@@ -197,11 +199,8 @@ fn render(id: &Value, size: u64, material: &Value) {
 
 /// Renders on a worker that hangs.
 fn tool(program: &str, arguments: &[String]) {
-    let launch = Launch {
-        program: program.into(),
-        args: arguments.iter().map(Into::into).collect(),
-        env: Vec::new(),
-    };
+    let launch =
+        Launch { program: program.into(), args: arguments.iter().map(Into::into).collect(), env: Vec::new() };
     let pool = Pool::start(launch, PoolOptions::default(), Arc::new(|| false)).unwrap();
     pool.scene("lit", &Scene::reference(), Illumination::Point, 8).unwrap();
     let Value::Object(values) = json!({"mode": "hang"}) else { unreachable!() };
