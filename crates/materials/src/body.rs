@@ -126,6 +126,16 @@ impl Material {
         Some(BlackBody { coloured, black, share: 1.0 - metalness })
     }
 
+    /// The materials whose pictures tell the diffuse reflection where nothing is known of the formulas: as [`Material::black_body`],
+    /// and for a Lambert term as well. `None` where there is no body to be seen.
+    pub fn blackened(&self) -> Option<BlackBody> {
+        if self.by_role(Role::DiffuseReflectance).is_some() {
+            let black = self.with_role(Role::DiffuseReflectance, &Value::Colour([0.0; 3]));
+            return Some(BlackBody { coloured: self.clone(), black, share: 1.0 });
+        }
+        self.black_body()
+    }
+
     /// The share of uniform light that the diffuse reflection sends back, per channel: what a furnace would show. Good to
     /// some thousandths.
     pub fn diffuse_albedo(&self) -> [f64; 3] {

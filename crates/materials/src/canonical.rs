@@ -61,6 +61,15 @@ impl Material {
         }
     }
 
+    /// True where turning the surface about its normal changes nothing.
+    pub fn is_isotropic(&self) -> bool {
+        if self.model().renderer.is_none() {
+            return self.bsdf().is_isotropic();
+        }
+        let is_stretched = self.mean(Role::Anisotropy).is_some_and(|a| a != 0.0);
+        !is_stretched && self.alpha().is_none_or(|[u, v]| u == v)
+    }
+
     /// True where the complex index is the one that counts: where the model has no choice, or it fell on the conductor.
     pub fn is_conductor(&self) -> bool {
         let choices = self.model().parameters.iter().zip(self.values()).filter(|(p, _)| p.name == "fresnel");

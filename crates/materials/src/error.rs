@@ -15,6 +15,14 @@ pub enum MaterialError {
         /// All known names.
         known: String,
     },
+    /// A model as another renderer describes it, which cannot be so.
+    #[error("the description of model '{model}' is wrong: {reason}")]
+    BadDescription {
+        /// Name of the model.
+        model: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The model has no parameter of that name.
     #[error("model '{model}' has no parameter '{name}'{}; its parameters: {known}", hint(.nearest))]
     UnknownParameter {
@@ -116,7 +124,7 @@ pub enum MaterialError {
 impl MaterialError {
     /// True where the request makes no sense; false where a file that it names cannot be used.
     pub fn is_usage(&self) -> bool {
-        !matches!(self, Self::BadFile { .. })
+        !matches!(self, Self::BadFile { .. } | Self::BadDescription { .. })
     }
 }
 

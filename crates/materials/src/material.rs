@@ -112,8 +112,8 @@ impl Material {
             let json = serde_json::from_str(text).map_err(|e| syntax(text, e.to_string()))?;
             return Self::from_json(&json);
         }
-        let (name, list) = text.split_once(':').unwrap_or((text, ""));
-        let mut assignment = Assignment::new(Self::named(name.trim())?);
+        let (name, list) = split_name(text);
+        let mut assignment = Assignment::new(Self::named(name)?);
         for item in list.split(',').map(str::trim).filter(|item| !item.is_empty()) {
             let (name, value) =
                 item.split_once('=').ok_or_else(|| syntax(text, format!("'{item}' is not NAME=VALUE")))?;
@@ -312,6 +312,20 @@ impl<'de> serde::Deserialize<'de> for Material {
         let json = Json::deserialize(deserializer)?;
         Self::from_json(&json).map_err(serde::de::Error::custom)
     }
+}
+
+/// Splits `MODEL:NAME=VALUE,…` into the model's name, which may have a colon of its own (`mitsuba:roughplastic`), and the list.
+pub fn split_name(text: &str) -> (&str, &str) {
+    let head = text.split('=').next().unwrap_or(text);
+    let (name, list) = match head.rfind(':') {
+        Some(colon) if head.len() < text.len() => (&text[..colon], &text[colon + 1..]),
+        // Without values: what follows a model of ours is meant to be some, and is refused as such.
+        _ => match text.split_once(':') {
+            Some((name, list)) if by_name(name).is_ok() || list.is_empty() => (name, list),
+            _ => (text, ""),
+        },
+    };
+    (name.trim(), list)
 }
 
 /// A material being written down, with the parameters that were named so far.

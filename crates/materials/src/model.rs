@@ -57,6 +57,8 @@ pub enum Family {
     Production,
     /// Measured materials.
     Measured,
+    /// Models of other renderers, whose formulas are not known here.
+    Foreign,
 }
 
 /// Makes a BSDF of values.
@@ -78,6 +80,9 @@ pub struct Model {
     pub reference: &'static str,
     /// Where it comes from.
     pub family: Family,
+    /// The renderer that alone can show it; `None` for ours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub renderer: Option<&'static str>,
     /// True where the lobe's reflectance grows towards grazing angles.
     pub has_fresnel: bool,
     /// True where light and viewer may be swapped.
@@ -124,6 +129,7 @@ impl Model {
         summary: "",
         reference: "",
         family: Family::Classic,
+        renderer: None,
         has_fresnel: true,
         is_reciprocal: true,
         largest_albedo: 1.0,

@@ -1,9 +1,9 @@
 //! Parameters as data: everything that the command line, the lattices, the strategies and the documents know of one.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a parameter does to the appearance; strategies, baselines and losses pair parameters of two models by it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// Albedo of an uncoupled Lambert term: what a scene may replace by a colour of its subject's own.
@@ -185,13 +185,14 @@ impl Role {
 }
 
 /// An interval of the real line, closed at the top; open or closed at the bottom.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// Lower end.
     pub min: f64,
     /// Upper end, included.
     pub max: f64,
     /// True where `min` itself is excluded.
+    #[serde(default)]
     pub open: bool,
 }
 
@@ -227,7 +228,7 @@ impl std::fmt::Display for Interval {
 }
 
 /// A regular lattice: `min, min + step, …, max`, or `min, min · step, …, max` where the scale is logarithmic.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Levels {
     /// First level.
     pub min: f64,

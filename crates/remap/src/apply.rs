@@ -46,6 +46,7 @@ pub fn apply(probe: &Probe, source: &Material, clamp: bool) -> Result<Applied, R
     check_fixed(probe, source)?;
     let mut values = vec![0.0; probe.target_axes.len()];
     let mut fitness = 0.0;
+    let mut body: Option<[f64; 3]> = None;
     let mut saturated: Vec<String> = Vec::new();
     let mut heaviest = 0.0;
     for corner in 0..1usize << places.len() {
@@ -56,6 +57,16 @@ pub fn apply(probe: &Probe, source: &Material, clamp: bool) -> Result<Applied, R
         }
         let indices: Vec<usize> = places.iter().enumerate().map(|(k, p)| p.index + side(k)).collect();
         let entry = probe.entry(&indices);
+        if let Some(reason) = &entry.failed {
+            return Err(RemapError::Option(format!(
+                "the probe has no result at {:?}, which is needed here: {reason}",
+                entry.source
+            )));
+        }
+        if let Some(gain) = entry.body {
+            let sum = body.get_or_insert([0.0; 3]);
+            (0..3).for_each(|c| sum[c] += weight * gain[c]);
+        }
         fitness += weight * entry.fitness;
         for (k, axis) in probe.target_axes.iter().enumerate() {
             if axis.len() > 2 {
@@ -70,7 +81,7 @@ pub fn apply(probe: &Probe, source: &Material, clamp: bool) -> Result<Applied, R
     }
     // Sums of products leave noise in the last digits: 0.30000000000000004.
     let values: Vec<f64> = values.iter().map(|v| (v * 1e12).round() / 1e12).collect();
-    let target = probe.target_material(source, &values)?;
+    let target = probe.target_material(source, &values, body)?;
     Ok(Applied { source: source.clone(), target, fitness, saturated, clamped })
 }
 

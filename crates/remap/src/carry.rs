@@ -27,22 +27,44 @@ impl<'a> SourceLook<'a> {
     /// With a rounded albedo: the targets of many sources then have the same few bodies, and need not be rendered for each. A
     /// body a little too bright or too dark is so in all targets of a source alike.
     pub(crate) fn rounded(material: &'a Material) -> Self {
-        Self { is_rounded: true, ..Self::new(material) }
+        Self::new(material).rounded_albedo()
+    }
+
+    /// With the albedo of its body as it was measured, for materials whose formulas are not known.
+    pub(crate) fn measured(material: &'a Material, albedo: [f64; 3]) -> Self {
+        let known = OnceLock::new();
+        known.get_or_init(|| albedo);
+        Self { albedo: known, ..Self::new(material) }
+    }
+
+    /// With its albedo rounded, if it is not looked up yet or known from a measurement.
+    pub(crate) fn rounded_albedo(mut self) -> Self {
+        self.is_rounded = true;
+        if let Some(albedo) = self.albedo.take() {
+            self.albedo.get_or_init(|| albedo.map(rounded));
+        }
+        self
     }
 
     fn albedo(&self) -> [f64; 3] {
-        let round = |v: f64| if self.is_rounded { (v * ALBEDOS).round() / ALBEDOS } else { v };
+        let round = |v: f64| if self.is_rounded { rounded(v) } else { v };
         *self.albedo.get_or_init(|| self.material.diffuse_albedo().map(round))
     }
 }
 
+fn rounded(albedo: f64) -> f64 {
+    (albedo * ALBEDOS).round() / ALBEDOS
+}
+
 /// How the colour of the body is carried over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Body {
     /// As it is written.
     Copied,
     /// Such that the diffuse reflections have the same albedo.
     Matched,
+    /// As it is written, times a factor that pictures gave.
+    Scaled([f64; 3]),
 }
 
 /// Sets what the search and the user leave alone to what the source has of it: a conductor's index, the colour of the body, the hue of
@@ -105,6 +127,10 @@ pub(crate) fn carry_over(
 
 /// Gives the target the source's colour of the body, once all else is set.
 fn colour_body(source: &SourceLook, target: &mut Material, role: Role, body: Body) -> Result<(), RemapError> {
+    if let Body::Scaled(gain) = body {
+        let scaled = std::array::from_fn(|c| source.look.body[c] * gain[c]);
+        return Ok(target.set_role(role, scaled)?);
+    }
     // Two Lambert terms are the same thing, and so are the bodies of one model.
     let same = source.material.by_role(role).and_then(|v| v.colour());
     let is_same_model = std::ptr::eq(source.material.model(), target.model());

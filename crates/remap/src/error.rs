@@ -29,6 +29,9 @@ pub enum RemapError {
     /// An option that does not fit the models.
     #[error("{0}")]
     Option(String),
+    /// A picture that another renderer did not deliver.
+    #[error("cannot render: {0}")]
+    Render(String),
     /// A probe file that cannot be read.
     #[error("cannot read probe '{}': {reason}", path.display())]
     Probe {

@@ -8,6 +8,7 @@
 mod apply;
 mod baseline;
 mod carry;
+mod cross;
 mod error;
 mod gallery;
 mod journal;
@@ -18,6 +19,7 @@ mod probe;
 mod projection;
 mod stage;
 mod strategy;
+mod studio;
 mod table;
 mod validate;
 
@@ -25,14 +27,16 @@ pub use lookmatch_search::Axis;
 
 pub use apply::{Applied, apply};
 pub use baseline::Baseline;
+pub use cross::CrossStage;
 pub use error::RemapError;
 pub use journal::journal_path;
 pub use losses::{Loss, LossClass, losses};
 pub use pairs::{PairScore, score_pair};
 pub use plan::{Assignment, Endpoint, Options, Plan, Preset, Side, Strategy, Vary};
-pub use probe::{Entry, Metric, Probe, Totals};
+pub use probe::{Entry, Metric, Noise, Probe, Totals};
 pub use stage::{Appearance, Stage};
-pub use strategy::{Event, remap};
+pub use strategy::{Event, remap, remap_across};
+pub use studio::{Counts, RendererRecord, Sampling, Shot, Studio};
 pub use validate::{
     Lighting, MethodScores, Scores, Statistics, ValidationReport, Validator, validation_points,
 };

@@ -145,7 +145,7 @@ fn is_handed_over(role: Role) -> bool {
 
 /// Mean and largest masked NRMSD of a probe.
 fn measured(probe: &Probe) -> [f64; 2] {
-    let all = || probe.entries.iter().flat_map(|entry| entry.nrmsd_masked);
+    let all = || probe.found().flat_map(|entry| entry.nrmsd_masked);
     let count = all().count().max(1) as f64;
     [all().sum::<f64>() / count, all().fold(0.0, f64::max)]
 }

@@ -7,6 +7,7 @@ use lookmatch_rendering::Scene;
 use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
 
+use crate::studio::{RendererRecord, Sampling};
 use crate::RemapError;
 use crate::carry::{Body, SourceLook, carry_over, metal};
 
@@ -80,6 +81,10 @@ pub struct Options {
     pub quick: bool,
     /// Side of the pictures in pixels, where it is not to be the usual one.
     pub size: Option<usize>,
+    /// Samples of the pictures of other renderers.
+    pub sampling: Sampling,
+    /// The renderers that are at hand.
+    pub renderers: Vec<RendererRecord>,
 }
 
 impl Default for Options {
@@ -94,6 +99,8 @@ impl Default for Options {
             mask: false,
             quick: false,
             size: None,
+            sampling: Sampling::default(),
+            renderers: Vec::new(),
         }
     }
 }
@@ -162,6 +169,12 @@ pub struct Plan {
     pub scene: Scene,
     /// Side of its pictures in pixels.
     pub size: usize,
+    /// Samples of the pictures of other renderers, where there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Sampling>,
+    /// Those renderers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renderers: Vec<RendererRecord>,
 }
 
 /// Sides of the reference pictures that can be compared: smaller ones show no highlight.
@@ -228,7 +241,13 @@ impl Plan {
         if options.quick {
             source.axes.iter_mut().for_each(|axis| *axis = thinned(axis));
         }
+        let is_foreign = from.renderer.is_some() || to.renderer.is_some();
+        let takes_part = |record: &&RendererRecord| {
+            [from, to].iter().any(|model| model.renderer == Some(record.name.as_str()))
+        };
         Ok(Self {
+            sampling: is_foreign.then_some(options.sampling),
+            renderers: options.renderers.iter().filter(takes_part).cloned().collect(),
             from: source.fixed,
             to: target.fixed,
             source_axes: source.axes,
@@ -241,7 +260,12 @@ impl Plan {
             metric: Fitness::default(),
             mask: options.mask,
             scene: Scene::reference(),
-            size: options.size.unwrap_or(if options.quick { 128 } else { 300 }),
+            size: options.size.unwrap_or(match (is_foreign, options.quick) {
+                // Pictures of other renderers take seconds, and as many times longer as they have pixels.
+                (true, true) => 64,
+                (true, false) | (false, true) => 128,
+                (false, false) => 300,
+            }),
         })
     }
 
@@ -257,9 +281,27 @@ impl Plan {
 
     /// [`Plan::target_material`] beside a source that is asked for more than once.
     pub(crate) fn target_beside(&self, source: &SourceLook, values: &[f64]) -> Result<Material, RemapError> {
+        self.target_with(source, values, Body::Matched)
+    }
+
+    /// [`Plan::target_beside`] with a choice of what becomes of the body's colour.
+    pub(crate) fn target_with(
+        &self,
+        source: &SourceLook,
+        values: &[f64],
+        body: Body,
+    ) -> Result<Material, RemapError> {
         let mut target = material(&self.to, &self.target_axes, values)?;
-        carry_over(source, &mut target, (&self.target_axes, &self.held), Body::Matched)?;
+        carry_over(source, &mut target, (&self.target_axes, &self.held), body)?;
         Ok(target)
+    }
+
+    /// Names of the renderers whose models it speaks of, ours left out.
+    pub fn renderers_needed(&self) -> Vec<&'static str> {
+        let mut names: Vec<&str> =
+            [&self.from, &self.to].into_iter().filter_map(|material| material.model().renderer).collect();
+        names.dedup();
+        names
     }
 }
 
@@ -383,7 +425,7 @@ impl Draft {
     /// parameters behind an alias (`roughness_u` and `roughness_v` behind `roughness`) one by one.
     fn follow(&mut self, source: &Draft) -> Result<(), RemapError> {
         let model = self.fixed.model();
-        let is_brushed = !source.fixed.bsdf().is_isotropic();
+        let is_brushed = !source.fixed.is_isotropic();
         let anisotropy = model.parameters.iter().find(|p| p.role == Role::Anisotropy);
         if let Some(parameter) = anisotropy.filter(|p| is_brushed && !self.held.contains(&p.name)) {
             self.vary_by_default(parameter.name, |range| range.search)?;

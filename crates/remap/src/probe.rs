@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::carry::{Body, SourceLook, carry_over};
 use crate::plan::{Plan, Preset, Strategy};
+use crate::studio::{RendererRecord, Sampling};
 use crate::{RemapError, plan};
 
 /// Version of the file format that is written; older ones are read, newer ones refused.
@@ -51,6 +52,12 @@ pub struct Probe {
     pub scene: Scene,
     /// Side of its pictures in pixels.
     pub size: usize,
+    /// Samples of the pictures of other renderers, where there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Sampling>,
+    /// Those renderers, with all that is needed to read their materials.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renderers: Vec<RendererRecord>,
     /// Sums over the whole remap.
     pub totals: Totals,
     /// One entry per source point, in lexicographic order of the source axes.
@@ -98,6 +105,45 @@ pub struct Entry {
     pub evaluations: usize,
     /// Target parameters that sit on the edge of their range, so that a better match may lie beyond.
     pub saturated: Vec<String>,
+    /// The colour of the target's body divided by that of the source's, where pictures told it and no formula.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<[f64; 3]>,
+    /// What noise leaves unknown, where there was some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<Noise>,
+    /// Why there is no result: then `target` is empty, and nothing else counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failed: Option<String>,
+}
+
+/// What noise leaves unknown of an entry.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Noise {
+    /// Standard error of the fitness.
+    pub fitness: f64,
+    /// NRMSD that two pictures of one material would have, per channel.
+    pub nrmsd: [f64; 3],
+    /// True where the target is clearly better than all others that were compared.
+    #[serde(rename = "decided")]
+    pub is_decided: bool,
+}
+
+impl Entry {
+    /// The entry of a source point that could not be rendered.
+    pub(crate) fn failed(source: Vec<f64>, reason: String) -> Self {
+        Self {
+            source,
+            target: Vec::new(),
+            fitness: 0.0,
+            nrmsd: [0.0; 3],
+            nrmsd_masked: [0.0; 3],
+            evaluations: 0,
+            saturated: Vec::new(),
+            body: None,
+            noise: None,
+            failed: Some(reason),
+        }
+    }
 }
 
 impl Probe {
@@ -125,6 +171,8 @@ impl Probe {
             },
             scene: plan.scene.clone(),
             size: plan.size,
+            sampling: plan.sampling,
+            renderers: plan.renderers.clone(),
             totals: Totals { evaluations, lattice_points },
             entries,
         }
@@ -150,6 +198,7 @@ impl Probe {
             }
             None => return Err(wrong("the field 'version' is missing or no number".into())),
         }
+        adopt_models(&json).map_err(wrong)?;
         let probe: Self = serde_path_to_error::deserialize(json).map_err(|e| wrong(e.to_string()))?;
         probe.check().map_err(wrong)?;
         Ok(probe)
@@ -186,12 +235,22 @@ impl Probe {
         plan::material(&self.from, &self.source_axes, values)
     }
 
-    /// The target material for values of the target axes, beside a source material.
-    pub fn target_material(&self, source: &Material, values: &[f64]) -> Result<Material, RemapError> {
+    /// The entries that have a result.
+    pub fn found(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|entry| entry.failed.is_none())
+    }
+
+    /// The target material for values of the target axes, beside a source material; `body` is what an entry says of it.
+    pub fn target_material(
+        &self,
+        source: &Material,
+        values: &[f64],
+        body: Option<[f64; 3]>,
+    ) -> Result<Material, RemapError> {
         let mut target = plan::material(&self.to, &self.target_axes, values)?;
         let source = SourceLook::new(source);
         let taken = (&self.target_axes[..], &self.held[..]);
-        carry_over(&source, &mut target, taken, Body::Matched)?;
+        carry_over(&source, &mut target, taken, body.map_or(Body::Matched, Body::Scaled))?;
         Ok(target)
     }
 
@@ -217,13 +276,19 @@ impl Probe {
         }
         for (place, entry) in self.entries.iter().enumerate() {
             let finite = |v: &[f64], n: usize| v.len() == n && v.iter().all(|x| x.is_finite());
+            let has_target = entry.failed.is_none();
+            let targets = if has_target { self.target_axes.len() } else { 0 };
             let sound = finite(&entry.source, self.source_axes.len())
-                && finite(&entry.target, self.target_axes.len())
+                && finite(&entry.target, targets)
+                && entry.body.is_none_or(|body| finite(&body, 3))
                 && entry.fitness.is_finite();
             if !sound {
                 return Err(format!("entry {place} lacks a value or holds one that is not finite"));
             }
-            self.target_material(&self.from, &entry.target).map_err(|e| format!("entry {place}: {e}"))?;
+            if has_target {
+                let target = self.target_material(&self.from, &entry.target, entry.body);
+                target.map_err(|e| format!("entry {place}: {e}"))?;
+            }
             if self
                 .indices(place)
                 .iter()
@@ -241,4 +306,17 @@ impl Probe {
         }
         Ok(())
     }
+}
+
+/// Makes the models of other renderers known that a probe speaks of: it can be read without them.
+fn adopt_models(probe: &serde_json::Value) -> Result<(), String> {
+    let Some(records) = probe.get("renderers") else { return Ok(()) };
+    let records: Vec<RendererRecord> =
+        serde_json::from_value(records.clone()).map_err(|e| format!("renderers: {e}"))?;
+    for record in records {
+        for model in record.models {
+            model.adopt(&record.name).map_err(|e| e.to_string())?;
+        }
+    }
+    Ok(())
 }

@@ -30,6 +30,17 @@ struct Images {
     environment: Vec<f32>,
 }
 
+impl Appearance {
+    /// Planes of the specular (0) or diffuse (1) picture under the point light (0) or the environment (1).
+    pub(crate) fn planes(&self, part: usize, light: usize) -> &[f32] {
+        let images = if part == 0 { &self.specular } else { &*self.diffuse };
+        if light == 0 { &images.point } else { &images.environment }
+    }
+}
+
+/// The lights of the reference scene, in the order of everything that is given for them.
+pub(crate) const LIGHTS: [Illumination; 2] = [Illumination::Point, Illumination::Environment];
+
 /// The reference scene, prepared under both lights.
 pub struct Stage {
     point: Renderer,
@@ -124,6 +135,36 @@ impl Stage {
         let diffuse = w.diffuse_point * self.rms(&a.point, &b.point)
             + w.diffuse_environment * self.rms(&a.environment, &b.environment);
         w.diffuse * diffuse
+    }
+
+    /// The scene under the point light and under the environment.
+    pub(crate) fn views(&self) -> [&Renderer; 2] {
+        [&self.point, &self.environment]
+    }
+
+    /// Side of the pictures in pixels.
+    pub fn size(&self) -> usize {
+        self.point.size()
+    }
+
+    /// Weights of equation 3: of the specular and the diffuse part, for each of them by light.
+    pub(crate) fn part_weights(&self) -> [[f64; 2]; 2] {
+        let w = &self.metric.weights;
+        [
+            [w.specular_point, w.specular_environment].map(|light| w.specular * light),
+            [w.diffuse_point, w.diffuse_environment].map(|light| w.diffuse * light),
+        ]
+    }
+
+    /// Mask weights on the subject's pixels, where there is a mask.
+    pub(crate) fn mask_weights(&self) -> Option<&[f32]> {
+        self.weights.as_deref()
+    }
+
+    /// Linear planes of a material's diffuse picture under the environment.
+    pub(crate) fn diffuse_planes(&self, material: &Material) -> Planes {
+        let lobes = SplitLobes::new(std::slice::from_ref(material));
+        self.environment.split_planes(&lobes).diffuse.swap_remove(lobes.diffuse_place(0))
     }
 
     /// What a unit of distance between two specular images adds to the fitness, by light: point, environment.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lookmatch_materials::{Role, Trend};
 use lookmatch_search::{
-    Bounds, Genetic, GeneticSettings, Lattice, Outcome, Point, Problem, Search, SearchError, by_name,
+    Bounds, Genetic, GeneticSettings, Lattice, Objective, Outcome, Point, Problem, Search, SearchError, by_name,
 };
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ use crate::carry::SourceLook;
 use crate::gallery::{Match, Stopped};
 use crate::journal::Journal;
 use crate::table::{BATCH, FitnessTable, Found, Task};
-use crate::{Entry, Plan, Probe, RemapError, Stage, Strategy};
+use crate::{CrossStage, Entry, Plan, Probe, RemapError, Stage, Strategy};
 
 /// Levels by which a result may differ from what its neighbours foresaw.
 const FORESEEN: u32 = 3;
@@ -58,16 +58,79 @@ pub fn remap(
     observe: &mut dyn FnMut(Event),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Probe, RemapError> {
-    let certified = plan.search == "exhaustive";
-    run(plan, stage, state, certified, observe, stop)
+    run(plan, Own { stage, is_certified: plan.search == "exhaustive" }.into(), state, observe, stop)
 }
 
-/// [`remap()`]; `certified` finds optima through a [`FitnessTable`], where targets can be shared.
+/// [`remap()`] where one of the models, or both, belong to other renderers.
+///
+/// # Errors
+/// As [`remap()`]; [`RemapError::Render`] where no source point could be rendered. Single ones that could not be make entries that
+/// say so.
+pub fn remap_across(
+    plan: &Plan,
+    stage: &CrossStage,
+    state: Option<&Path>,
+    observe: &mut dyn FnMut(Event),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Probe, RemapError> {
+    let probe = run(plan, Eye::Cross(stage), state, observe, stop)?;
+    let first_failure = probe.entries.first().and_then(|entry| entry.failed.clone());
+    match first_failure.filter(|_| probe.found().next().is_none()) {
+        Some(reason) => Err(RemapError::Render(reason)),
+        None => Ok(probe),
+    }
+}
+
+/// Our own renderer as the judge; `is_certified` finds optima through a [`FitnessTable`], where targets can be shared.
+struct Own<'a> {
+    stage: &'a Stage,
+    is_certified: bool,
+}
+
+/// The match of one source point.
+pub(crate) struct Matched {
+    pub(crate) best: Point,
+    /// Targets that were compared with it in full.
+    pub(crate) compared: usize,
+    pub(crate) entry: Entry,
+}
+
+/// Who looks at the materials.
+enum Eye<'a> {
+    Own(Own<'a>),
+    Cross(&'a CrossStage),
+}
+
+impl<'a> From<Own<'a>> for Eye<'a> {
+    fn from(own: Own<'a>) -> Self {
+        Self::Own(own)
+    }
+}
+
+impl Eye<'_> {
+    /// The match of one source point.
+    fn find(
+        &self,
+        plan: &Plan,
+        values: &[f64],
+        problem: &Problem,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Matched, RemapError> {
+        match self {
+            Self::Cross(stage) => stage.find(plan, values, problem, stop),
+            Self::Own(Own { stage, .. }) => {
+                let outcome = search_one(plan, stage, values, problem, stop)?;
+                let entry = entry(plan, stage, problem.lattice, values.to_vec(), &outcome)?;
+                Ok(Matched { best: outcome.best, compared: outcome.evaluations, entry })
+            }
+        }
+    }
+}
+
 fn run(
     plan: &Plan,
-    stage: &Stage,
+    eye: Eye,
     state: Option<&Path>,
-    certified: bool,
     observe: &mut dyn FnMut(Event),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Probe, RemapError> {
@@ -88,11 +151,13 @@ fn run(
         observe(Event::Resumed { done: resumed });
     }
     let pairing = Pairing::new(plan)?;
-    let table = if certified && resumed < total {
-        let table = FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop);
-        table.map_err(|e| interrupted(e, resumed, total))?
-    } else {
-        None
+    let table = match &eye {
+        Eye::Own(Own { stage, is_certified: true }) if resumed < total => {
+            let table = FitnessTable::fill(plan, stage, &lattice, &sources, observe, stop);
+            let table = table.map_err(|e| interrupted(e, resumed, total))?;
+            table.map(|table| (table, *stage))
+        }
+        _ => None,
     };
     let mut done = resumed;
     for wave in waves(plan, &sources, table.is_some()) {
@@ -105,26 +170,24 @@ fn run(
         let problem = |indices: &Point| match plan.strategy {
             Strategy::Unconstrained => pairing.alone(&lattice, plan.seed),
             Strategy::Constrained => pairing.led(&lattice, plan.seed, indices, &|p| {
-                found[place_of(&sources, p)].as_ref().map(|(point, _)| point)
+                let result = found[place_of(&sources, p)].as_ref();
+                result.filter(|(_, entry)| entry.failed.is_none()).map(|(point, _)| point)
             }),
         };
         let problems: Vec<Problem> = wave.iter().map(|(_, indices)| problem(indices)).collect();
         let searched = match &table {
-            Some(table) => search_all(plan, table, &values, problems, stop),
-            None => (values.iter().zip(&problems))
-                .map(|(values, problem)| search_one(plan, stage, values, problem, stop))
-                .map(|outcome| outcome.map(|outcome| Found { compared: outcome.evaluations, outcome }))
-                .collect(),
-        };
-        let results: Vec<Found> = searched.map_err(|e| interrupted(e, done, total))?;
-        let entries = values.into_par_iter().zip(&results);
-        let entries = entries.map(|(values, found)| entry(plan, stage, &lattice, values, &found.outcome));
-        let entries: Vec<Entry> = entries.collect::<Result<_, _>>()?;
-        for (((place, _), Found { outcome, compared }), entry) in wave.into_iter().zip(results).zip(entries) {
-            if let Some(journal) = &mut journal {
-                journal.append(place, &outcome.best, &entry)?;
+            Some((table, stage)) => search_all(plan, (table, stage), &lattice, &values, problems, stop),
+            None => {
+                let points = values.iter().zip(&problems);
+                points.map(|(values, problem)| eye.find(plan, values, problem, stop)).collect()
             }
-            found[place] = Some((outcome.best, entry));
+        };
+        let results: Vec<Matched> = searched.map_err(|e| interrupted(e, done, total))?;
+        for ((place, _), Matched { best, compared, entry }) in wave.into_iter().zip(results) {
+            if let Some(journal) = &mut journal {
+                journal.append(place, &best, &entry)?;
+            }
+            found[place] = Some((best, entry));
             done += 1;
             observe(Event::Point { done, total, compared });
         }
@@ -165,16 +228,22 @@ fn waves(plan: &Plan, sources: &Lattice, together: bool) -> Vec<Vec<(usize, Poin
 /// Searches the targets of several source points that do not depend on each other.
 fn search_all(
     plan: &Plan,
-    table: &FitnessTable,
+    (table, stage): (&FitnessTable, &Stage),
+    lattice: &Lattice,
     values: &[Vec<f64>],
     problems: Vec<Problem>,
     stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<Found>, RemapError> {
+) -> Result<Vec<Matched>, RemapError> {
     let task = |(values, problem): (&Vec<f64>, Problem)| {
         Ok(Task { source: plan.source_material(values)?, bounds: problem.bounds })
     };
     let tasks = values.iter().zip(problems).map(task).collect::<Result<Vec<_>, RemapError>>()?;
-    table.search(&tasks, stop)
+    let results = table.search(&tasks, stop)?;
+    let entry = |(values, Found { outcome, compared }): (&Vec<f64>, Found)| {
+        let entry = entry(plan, stage, lattice, values.clone(), &outcome)?;
+        Ok(Matched { best: outcome.best, compared, entry })
+    };
+    values.par_iter().zip(results).map(entry).collect()
 }
 
 /// Searches the target of one source point.
@@ -196,8 +265,24 @@ fn search_one(
     Ok(Outcome { fitness: stage.fitness(appearance, &seen), ..found })
 }
 
+/// An objective that knows how many points it compared.
+pub(crate) trait Counting: Objective {
+    /// Points that were compared so far, also by an earlier search of the same source.
+    fn compared(&self) -> usize;
+}
+
+impl Counting for Match<'_> {
+    fn compared(&self) -> usize {
+        self.compared.len()
+    }
+}
+
 /// Runs the search method of a plan.
-fn searched(plan: &Plan, problem: &Problem, objective: &mut Match) -> Result<Outcome, RemapError> {
+pub(crate) fn searched<O: Counting>(
+    plan: &Plan,
+    problem: &Problem,
+    objective: &mut O,
+) -> Result<Outcome, RemapError> {
     let mut run = |method: &dyn Search| method.run(problem, objective).map_err(RemapError::Search);
     if plan.search != "genetic" || problem.guesses.is_empty() {
         return run(&*by_name(&plan.search).map_err(RemapError::Search)?);
@@ -209,7 +294,7 @@ fn searched(plan: &Plan, problem: &Problem, objective: &mut Match) -> Result<Out
     }
     // ... unless they did not foresee the result: then it may be any local optimum.
     let wide = run(&Genetic::default())?;
-    let evaluations = objective.compared.len();
+    let evaluations = objective.compared();
     let best = if (wide.fitness, &wide.best) < (near.fitness, &near.best) { wide } else { near };
     Ok(Outcome { evaluations, ..best })
 }
@@ -229,11 +314,6 @@ fn entry(
     let target = lattice.values(&outcome.best);
     let material = plan.source_material(&source)?;
     let [nrmsd, nrmsd_masked] = stage.nrmsd(&material, &plan.target_material(&material, &target)?)?;
-    let on_edge = |(axis, index): (&lookmatch_search::Axis, &u32)| {
-        // Of two levels one is always an edge: a switch is not saturated.
-        let edge = *index == 0 || *index as usize == axis.len() - 1;
-        (axis.len() > 2 && edge).then(|| axis.name.clone())
-    };
     Ok(Entry {
         source,
         target,
@@ -241,8 +321,21 @@ fn entry(
         nrmsd,
         nrmsd_masked,
         evaluations: outcome.evaluations,
-        saturated: lattice.axes.iter().zip(&outcome.best).filter_map(on_edge).collect(),
+        saturated: on_edge(lattice, &outcome.best),
+        body: None,
+        noise: None,
+        failed: None,
     })
+}
+
+/// Axes on whose edge a point lies.
+pub(crate) fn on_edge(lattice: &Lattice, point: &Point) -> Vec<String> {
+    let on_edge = |(axis, index): (&lookmatch_search::Axis, &u32)| {
+        // Of two levels one is always an edge: a switch is not saturated.
+        let edge = *index == 0 || *index as usize == axis.len() - 1;
+        (axis.len() > 2 && edge).then(|| axis.name.clone())
+    };
+    lattice.axes.iter().zip(point).filter_map(on_edge).collect()
 }
 
 /// The place of indices in lexicographic order.
@@ -407,7 +500,8 @@ mod tests {
                 sum += compared;
             }
         };
-        let probe = run(plan, stage, None, certified, &mut observe, &|| false).unwrap();
+        let own = Own { stage, is_certified: certified };
+        let probe = run(plan, own.into(), None, &mut observe, &|| false).unwrap();
         (probe.entries, sum)
     }
 

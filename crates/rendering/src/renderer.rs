@@ -200,6 +200,12 @@ impl Renderer {
         &self.subjects
     }
 
+    /// What subject pixels show beside the subject, where they share it with what is behind.
+    pub fn subject_background(&self) -> Planes {
+        let value = |pixel: &u32, c: usize| self.background[*pixel as usize][c];
+        std::array::from_fn(|c| self.subjects.iter().map(|pixel| value(pixel, c)).collect())
+    }
+
     /// Side of the picture in pixels.
     pub fn size(&self) -> usize {
         self.film.size

@@ -2,6 +2,7 @@
 
 use crate::MaterialError;
 use crate::error::nearest;
+use crate::foreign::{adopted, names_of};
 use crate::model::Model;
 
 mod measured;
@@ -50,14 +51,19 @@ pub fn registry() -> &'static [&'static Model] {
     MODELS
 }
 
-/// The model of a name.
+/// The model of a name: ours, or `RENDERER:MODEL` of a renderer that described its own.
 ///
 /// # Errors
 /// [`MaterialError::UnknownModel`] with the nearest name.
 pub fn by_name(name: &str) -> Result<&'static Model, MaterialError> {
-    registry().iter().find(|m| m.name == name).copied().ok_or_else(|| MaterialError::UnknownModel {
-        name: name.to_owned(),
-        nearest: nearest(name, registry().iter().map(|m| m.name)),
-        known: registry().iter().map(|m| m.name).collect::<Vec<_>>().join(", "),
+    let ours = registry().iter().find(|m| m.name == name).copied();
+    ours.or_else(|| adopted(name)).ok_or_else(|| {
+        let of_renderer = name.split_once(':').map(|(renderer, _)| names_of(renderer)).unwrap_or_default();
+        let known = match of_renderer[..] {
+            [] => registry().iter().map(|m| m.name).collect(),
+            _ => of_renderer,
+        };
+        let nearest = nearest(name, known.iter().copied());
+        MaterialError::UnknownModel { name: name.to_owned(), nearest, known: known.join(", ") }
     })
 }

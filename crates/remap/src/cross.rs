@@ -1,0 +1,607 @@
+//! Remaps into, out of and between other renderers: all that is known of their materials is pictures.
+//!
+//! Their pictures are dear and noisy. So the search compares specular pictures alone, of black bodies: they serve every source,
+//! whatever its colour. The body's colour is measured once the lobe is found. Each picture is two with independent noise,
+//! whose differences to two others are multiplied instead of squared: noise adds nothing to that product on average, so
+//! a noisy candidate is no worse than a clean one. What noise leaves undecided is rendered with more samples.
+
+use std::collections::HashMap;
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lookmatch_imaging::{Image, lab_planes_of, nrmsd};
+use lookmatch_materials::{BlackBody, Material, Role};
+use lookmatch_rendering::{Illumination, Observe, Part, Planes, Renderer, TransportCache};
+use lookmatch_search::{Lattice, Objective, ObjectiveError, Point, Problem, SearchError};
+use lru::LruCache;
+
+use crate::carry::{Body, SourceLook};
+use crate::gallery::{Key, Stopped, key};
+use crate::probe::Noise;
+use crate::stage::{Appearance, LIGHTS};
+use crate::strategy::{Counting, Matched, searched};
+use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
+use crate::{Entry, Plan, RemapError, Stage};
+
+/// Names of the reference scene under its lights, point and environment.
+const SCENES: [&str; 2] = ["reference-point", "reference-environment"];
+/// Fitness of a candidate that could not be rendered: worse than any picture can be.
+const FAILED: f64 = 1e9;
+/// Candidates that are refined when noise does not tell them apart.
+const CONTENDERS: usize = 6;
+/// Standard errors by which one candidate must be better than another.
+const CLEAR: f64 = 2.0;
+/// Memory for looks, in bytes.
+const CAPACITY: usize = 500 << 20;
+/// Share of a body's brightness that its measurement may be off by.
+const BODY_TOLERANCE: f64 = 0.005;
+/// Renders of a body that its measurement may take.
+const BODY_STEPS: usize = 3;
+
+/// The reference scene with materials of other renderers on it, and ours.
+pub struct CrossStage {
+    own: Stage,
+    archives: Vec<Archive>,
+    sampling: Sampling,
+    /// What our subject pixels show beside the subject under both lights.
+    background: [Planes; 2],
+    looks: Mutex<LruCache<Key, Arc<Taken>>>,
+}
+
+/// What the metric knows of a material.
+#[derive(Clone)]
+enum Look {
+    /// One of ours: without noise.
+    Own(Arc<Appearance>),
+    Taken(Arc<Taken>),
+}
+
+/// A look made of pictures.
+struct Taken {
+    specular: [Noisy; 2],
+    diffuse: Option<Diffuse>,
+    samples: u32,
+}
+
+/// Diffuse pictures under both lights.
+struct Diffuse {
+    images: [Noisy; 2],
+    /// Mean radiance under the environment, per channel.
+    level: [f64; 3],
+}
+
+/// CIELAB planes of a picture: two with independent noise, or one without.
+struct Noisy {
+    first: Vec<f32>,
+    second: Option<Vec<f32>>,
+}
+
+/// A fitness and its standard error.
+#[derive(Clone, Copy, Debug)]
+struct Score {
+    value: f64,
+    error: f64,
+}
+
+/// A sum of pictures: weights and materials.
+type Sum = Vec<(f32, Material)>;
+
+/// Pictures of a material that make its specular and its diffuse one.
+struct Recipe {
+    specular: Sum,
+    diffuse: Sum,
+}
+
+impl Recipe {
+    /// The diffuse reflection is what a black body takes away ([`Material::blackened`]).
+    fn of(material: &Material) -> Self {
+        match material.blackened() {
+            None => Self { specular: vec![(1.0, material.clone())], diffuse: Vec::new() },
+            Some(BlackBody { coloured, black, share }) => {
+                let share = share as f32;
+                let diffuse = vec![(share, coloured.clone()), (-share, black.clone())];
+                let mut specular = vec![(1.0, material.clone()), (-share, coloured), (share, black)];
+                if specular[0].1 == specular[1].1 && share == 1.0 {
+                    specular.drain(..2);
+                }
+                Self { specular, diffuse }
+            }
+        }
+    }
+}
+
+impl CrossStage {
+    /// Prepares the reference scene of a plan in every renderer that it names.
+    ///
+    /// # Errors
+    /// As [`Stage::cached`]; a renderer that is not among the studios, or cannot show the scene.
+    pub fn cached(
+        plan: &Plan,
+        studios: &[Arc<dyn Studio>],
+        cache: &TransportCache,
+        observe: Observe,
+    ) -> Result<Self, RemapError> {
+        let own = Stage::cached(plan, cache, observe)?;
+        let sampling = plan.sampling.unwrap_or_default();
+        let mut archives: Vec<Archive> = Vec::new();
+        for renderer in plan.renderers_needed() {
+            let studio = studio_of(studios, renderer)?;
+            for (name, light) in SCENES.into_iter().zip(LIGHTS) {
+                let set = studio.set_scene(name, &plan.scene, light, plan.size);
+                set.map_err(|reason| RemapError::Render(format!("{renderer}: {reason}")))?;
+            }
+            archives.push(Archive::new(studio, plan.size, plan.seed));
+        }
+        let background = own.views().map(Renderer::subject_background);
+        let bytes = 8 * 3 * background[0][0].len() * size_of::<f32>();
+        let room = NonZeroUsize::new(CAPACITY / bytes.max(1)).unwrap_or(NonZeroUsize::MIN);
+        Ok(Self { own, archives, sampling, background, looks: Mutex::new(LruCache::new(room)) })
+    }
+
+    /// What each renderer has cost so far, by name.
+    pub fn counts(&self) -> Vec<(String, Counts)> {
+        self.archives.iter().map(|a| (a.studio.name().to_owned(), a.counts())).collect()
+    }
+
+    /// Our own renderer on the same stage.
+    pub fn own(&self) -> &Stage {
+        &self.own
+    }
+
+    /// The picture of a material under the environment, and its noise: the root mean square error of each pixel as an image,
+    /// about.
+    ///
+    /// # Errors
+    /// Where it cannot be rendered.
+    pub fn picture(&self, material: &Material, light: Illumination, samples: u32) -> Result<(Image, Option<Image>), RemapError> {
+        let place = if light == Illumination::Point { 0 } else { 1 };
+        let Some(archive) = self.archive(material) else {
+            return Ok((self.own.views()[place].render(material, Part::Full), None));
+        };
+        let takes = archive.takes(&[(material, SCENES[place])], samples).swap_remove(0);
+        let takes = takes.map_err(RemapError::Render)?;
+        Ok((takes.whole(), noise(&takes)))
+    }
+
+    /// NRMSD per channel of the full pictures under the environment, whole image: without and with the mask; and what noise
+    /// alone makes of the first.
+    ///
+    /// # Errors
+    /// Where one of them cannot be rendered.
+    pub fn nrmsd(
+        &self,
+        source: &Material,
+        target: &Material,
+        samples: u32,
+    ) -> Result<([[f64; 3]; 2], [f64; 3]), RemapError> {
+        let (a, noise_a) = self.picture(source, Illumination::Environment, samples)?;
+        let (b, noise_b) = self.picture(target, Illumination::Environment, samples)?;
+        let mask = self.own.views()[1].mask();
+        let mut floor = [0.0; 3];
+        for noise in [noise_a, noise_b].into_iter().flatten() {
+            let mut noisy = a.clone();
+            for (out, noise) in noisy.pixels_mut().iter_mut().zip(noise.pixels()) {
+                (0..3).for_each(|c| out[c] += noise[c]);
+            }
+            let share = nrmsd(&a, &noisy, None)?;
+            (0..3).for_each(|c| floor[c] += share[c] * share[c]);
+        }
+        Ok(([nrmsd(&a, &b, None)?, nrmsd(&a, &b, Some(mask))?], floor.map(f64::sqrt)))
+    }
+
+    fn archive(&self, material: &Material) -> Option<&Archive> {
+        let renderer = material.model().renderer?;
+        self.archives.iter().find(|archive| archive.studio.name() == renderer)
+    }
+
+    /// Materials as they are seen, with their diffuse pictures if `whole`.
+    fn looks(&self, materials: &[Material], whole: bool, samples: u32) -> Vec<Result<Look, String>> {
+        let Some(archive) = materials.first().and_then(|first| self.archive(first)) else {
+            return self.own.known_appearances(materials).into_iter().map(|seen| Ok(Look::Own(seen))).collect();
+        };
+        let known: Vec<Option<Arc<Taken>>> = materials.iter().map(|m| self.known(m, whole, samples)).collect();
+        let recipes: Vec<Recipe> =
+            materials.iter().zip(&known).filter(|(_, known)| known.is_none()).map(|(m, _)| Recipe::of(m)).collect();
+        let sums = |recipe: &'_ Recipe| -> Vec<Material> {
+            let diffuse = recipe.diffuse.iter().filter(|_| whole);
+            recipe.specular.iter().chain(diffuse).map(|(_, material)| material.clone()).collect()
+        };
+        let wanted: Vec<Material> = recipes.iter().flat_map(sums).collect();
+        let shots: Vec<(&Material, &'static str)> =
+            wanted.iter().flat_map(|material| SCENES.map(|scene| (material, scene))).collect();
+        let mut taken = archive.takes(&shots, samples).into_iter();
+        let mut recipes = recipes.iter();
+        let mut look = |(material, known): (&Material, Option<Arc<Taken>>)| {
+            if let Some(known) = known {
+                return Ok(Look::Taken(known));
+            }
+            let recipe = recipes.next().ok_or("a material was lost")?;
+            let count = recipe.specular.len() + if whole { recipe.diffuse.len() } else { 0 };
+            let takes: Vec<Result<Arc<Takes>, String>> = taken.by_ref().take(2 * count).collect();
+            let takes = takes.into_iter().collect::<Result<Vec<_>, String>>()?;
+            let look = Arc::new(self.developed(recipe, &takes, whole, samples));
+            self.kept().put(key(material), look.clone());
+            Ok(Look::Taken(look))
+        };
+        materials.iter().zip(known).map(&mut look).collect()
+    }
+
+    fn look(&self, material: &Material, whole: bool, samples: u32) -> Result<Look, RemapError> {
+        self.looks(std::slice::from_ref(material), whole, samples).swap_remove(0).map_err(RemapError::Render)
+    }
+
+    fn kept(&self) -> std::sync::MutexGuard<'_, LruCache<Key, Arc<Taken>>> {
+        // A panic elsewhere leaves nothing half-written in this map.
+        self.looks.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn known(&self, material: &Material, whole: bool, samples: u32) -> Option<Arc<Taken>> {
+        let known = self.kept().get(&key(material)).cloned()?;
+        (known.samples >= samples && (known.diffuse.is_some() || !whole)).then_some(known)
+    }
+
+    /// Adds up pictures; `takes` has both lights of each material of the recipe.
+    fn developed(&self, recipe: &Recipe, takes: &[Arc<Takes>], whole: bool, samples: u32) -> Taken {
+        let of_light = |sum: &Sum, first: usize, light: usize, background: f32| -> Vec<Planes> {
+            let pictures: Vec<(f32, &Takes)> =
+                sum.iter().enumerate().map(|(k, (w, _))| (*w, &*takes[2 * (first + k) + light])).collect();
+            let halves = pictures.iter().map(|(_, takes)| takes.halves.len()).max().unwrap_or(1);
+            (0..halves).map(|half| self.summed(&pictures, half, light, background)).collect()
+        };
+        // A specular picture is without what is behind the subject, a diffuse one has it.
+        let specular = [0, 1].map(|light| Noisy::of(&of_light(&recipe.specular, 0, light, -1.0)));
+        let diffuse = whole.then(|| {
+            let planes = [0, 1].map(|light| of_light(&recipe.diffuse, recipe.specular.len(), light, 1.0));
+            Diffuse { level: self.level(&planes[1]), images: planes.map(|planes| Noisy::of(&planes)) }
+        });
+        Taken { specular, diffuse, samples }
+    }
+
+    /// A sum of pictures on the subject's pixels.
+    fn summed(&self, pictures: &[(f32, &Takes)], half: usize, light: usize, background: f32) -> Planes {
+        let behind = &self.background[light];
+        let mut planes: Planes = std::array::from_fn(|c| behind[c].iter().map(|b| background * b).collect());
+        for (weight, takes) in pictures {
+            let image = &takes.halves[half.min(takes.halves.len() - 1)];
+            for (k, pixel) in self.own.views()[light].subjects().iter().enumerate() {
+                let value = image.pixels()[*pixel as usize];
+                (0..3).for_each(|c| planes[c][k] += weight * value[c]);
+            }
+        }
+        planes
+    }
+
+    /// Mean of diffuse pictures under the environment without what is behind the subject.
+    fn level(&self, halves: &[Planes]) -> [f64; 3] {
+        let behind = &self.background[1];
+        std::array::from_fn(|c| {
+            let sum = |planes: &Planes| -> f64 {
+                planes[c].iter().zip(&behind[c]).map(|(value, behind)| f64::from(value - behind)).sum()
+            };
+            halves.iter().map(sum).sum::<f64>() / (halves.len() * behind[c].len()) as f64
+        })
+    }
+
+    /// The brightness of a material's body under the environment.
+    fn body_level(&self, material: &Material, look: &Look) -> [f64; 3] {
+        match look {
+            Look::Taken(taken) => taken.diffuse.as_ref().map_or([0.0; 3], |diffuse| diffuse.level),
+            Look::Own(_) => self.level(&[self.own.diffuse_planes(material)]),
+        }
+    }
+
+    /// Equation 3 between two looks.
+    fn score(&self, a: &Look, b: &Look, with_diffuse: bool) -> Score {
+        let parts = if with_diffuse { 2 } else { 1 };
+        let (mut value, mut variance) = (0.0, 0.0);
+        for (part, weights) in self.own.part_weights().into_iter().enumerate().take(parts) {
+            for (light, weight) in weights.into_iter().enumerate() {
+                let (Some(a), Some(b)) = (a.planes(part, light), b.planes(part, light)) else { continue };
+                let (sum, error) = product_of_differences(a, b, self.own.mask_weights());
+                let pixels = (self.own.size() * self.own.size()) as f64;
+                let root = (sum.abs() / pixels).sqrt();
+                value += weight * root.copysign(sum);
+                // Of the root, near 0 as well, where noise alone decides its size.
+                let slope = 0.5 / (sum.abs().max(error) / pixels).sqrt().max(1e-12);
+                variance += (weight * slope * error / pixels).powi(2);
+            }
+        }
+        Score { value, error: variance.sqrt() }
+    }
+}
+
+impl Look {
+    /// Planes of the specular (0) or diffuse (1) picture under a light.
+    fn planes(&self, part: usize, light: usize) -> Option<(&[f32], Option<&[f32]>)> {
+        match self {
+            Self::Own(seen) => Some((seen.planes(part, light), None)),
+            Self::Taken(taken) => {
+                let images = if part == 0 { &taken.specular } else { &taken.diffuse.as_ref()?.images };
+                Some((&images[light].first, images[light].second.as_deref()))
+            }
+        }
+    }
+}
+
+impl Noisy {
+    fn of(halves: &[Planes]) -> Self {
+        let lab = |[r, g, b]: &Planes| {
+            let mut lab = vec![0.0; 3 * r.len()];
+            lab_planes_of([r, g, b], &mut lab);
+            lab
+        };
+        Self { first: lab(&halves[0]), second: halves.get(1).map(lab) }
+    }
+}
+
+/// What noise makes of a mean of two halves.
+fn noise(takes: &Takes) -> Option<Image> {
+    let [first, second] = &takes.halves[..] else { return None };
+    let mut noise = first.clone();
+    for (out, other) in noise.pixels_mut().iter_mut().zip(second.pixels()) {
+        (0..3).for_each(|c| out[c] = (out[c] - other[c]) / 2.0);
+    }
+    Some(noise)
+}
+
+/// The sum of squared differences of two pictures without noise, estimated from two halves of each, and its standard error.
+///
+/// With differences `d₁ = x + n₁` and `d₂ = x + n₂` of independent noise, `E[d₁d₂] = x²`; its variance is `2x²σ² + σ⁴`, with
+/// `σ² = E[(d₁ − d₂)²]/2`.
+fn product_of_differences(
+    (a1, a2): (&[f32], Option<&[f32]>),
+    (b1, b2): (&[f32], Option<&[f32]>),
+    mask: Option<&[f32]>,
+) -> (f64, f64) {
+    let is_noisy = a2.is_some() || b2.is_some();
+    let (a2, b2) = (a2.unwrap_or(a1), b2.unwrap_or(b1));
+    let pixels = a1.len() / 3;
+    let (mut sum, mut variance) = (0.0f64, 0.0f64);
+    for k in 0..a1.len() {
+        let weight = mask.map_or(1.0, |mask| f64::from(mask[k % pixels]));
+        let (d1, d2) = (f64::from(a1[k] - b1[k]), f64::from(a2[k] - b2[k]));
+        sum += weight * weight * d1 * d2;
+        if is_noisy {
+            let noise = (d1 - d2) * (d1 - d2) / 2.0;
+            variance += weight.powi(4) * (2.0 * (d1 * d2).max(0.0) * noise + noise * noise / 3.0);
+        }
+    }
+    (sum, variance.sqrt())
+}
+
+/// The fitness of target points against one source material.
+struct CrossMatch<'a> {
+    plan: &'a Plan,
+    stage: &'a CrossStage,
+    lattice: &'a Lattice,
+    source: SourceLook<'a>,
+    seen: Look,
+    /// Points that were compared so far.
+    scores: HashMap<Point, f64>,
+    stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl CrossMatch<'_> {
+    fn targets(&self, points: &[Point]) -> Result<Vec<Material>, RemapError> {
+        let target = |p: &Point| self.plan.target_with(&self.source, &self.lattice.values(p), self.body());
+        points.iter().map(target).collect()
+    }
+
+    /// Ours are cheap, and compared with their bodies; those of others are searched without.
+    fn body(&self) -> Body {
+        if self.plan.to.model().renderer.is_none() { Body::Matched } else { Body::Copied }
+    }
+
+    /// Scores of points at a number of samples; those that cannot be rendered score [`FAILED`].
+    fn scored(&self, points: &[Point], samples: u32) -> Result<Vec<Score>, RemapError> {
+        let with_diffuse = self.body() == Body::Matched;
+        let looks = self.stage.looks(&self.targets(points)?, false, samples);
+        let score = |look: Result<Look, String>| match look {
+            Ok(look) => self.stage.score(&self.seen, &look, with_diffuse),
+            Err(_) => Score { value: FAILED, error: 0.0 },
+        };
+        Ok(looks.into_iter().map(score).collect())
+    }
+
+    /// Renders the best points and their neighbours with more and more samples, until one of them is clearly the best or the
+    /// budget ends; says which it was.
+    fn settled(&mut self, found: &Point, problem: &Problem, most: u32) -> Result<(Point, bool), RemapError> {
+        let mut samples = self.stage.sampling.samples;
+        let mut points: Vec<Point> = self.scores.keys().cloned().collect();
+        for neighbour in neighbours(found, problem) {
+            if !points.contains(&neighbour) {
+                points.push(neighbour);
+            }
+        }
+        // Two thirds of all points are far off: no number of samples would bring them back.
+        points.sort_by(|a, b| self.known(a).total_cmp(&self.known(b)).then_with(|| a.cmp(b)));
+        points.truncate(4 * CONTENDERS);
+        loop {
+            if (self.stop)() {
+                return Err(stopped());
+            }
+            let scores = self.scored(&points, samples)?;
+            let mut ranked: Vec<(Score, Point)> = scores.into_iter().zip(points).collect();
+            ranked.sort_by(|a, b| a.0.value.total_cmp(&b.0.value).then_with(|| a.1.cmp(&b.1)));
+            ranked.iter().for_each(|(score, point)| {
+                self.scores.insert(point.clone(), score.value);
+            });
+            let best = ranked[0].0;
+            let is_open = |other: &Score| {
+                other.value - best.value <= CLEAR * (best.error.powi(2) + other.error.powi(2)).sqrt()
+            };
+            let open = ranked.iter().take_while(|(score, _)| is_open(score)).count().clamp(1, CONTENDERS);
+            ranked.truncate(open);
+            points = ranked.into_iter().map(|(_, point)| point).collect();
+            if open == 1 || samples >= most || best.error == 0.0 {
+                return Ok((points.swap_remove(0), open == 1 || best.error == 0.0));
+            }
+            samples = (4 * samples).min(most);
+        }
+    }
+
+    fn known(&self, point: &Point) -> f64 {
+        // Neighbours that were not seen yet come first.
+        self.scores.get(point).copied().unwrap_or(f64::NEG_INFINITY)
+    }
+}
+
+impl Objective for CrossMatch<'_> {
+    fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, ObjectiveError> {
+        let scores = self.scored(points, self.stage.sampling.samples)?;
+        if (self.stop)() {
+            return Err(Box::new(Stopped));
+        }
+        self.scores.extend(points.iter().cloned().zip(scores.iter().map(|score| score.value)));
+        Ok(scores.into_iter().map(|score| score.value).collect())
+    }
+}
+
+impl Counting for CrossMatch<'_> {
+    fn compared(&self) -> usize {
+        self.scores.len()
+    }
+}
+
+/// Points one step away along one axis, within bounds.
+fn neighbours(point: &Point, problem: &Problem) -> Vec<Point> {
+    let mut found = vec![point.clone()];
+    for axis in (0..point.len()).filter(|axis| problem.lattice.axes[*axis].len() > 2) {
+        for index in [point[axis].checked_sub(1), Some(point[axis] + 1)].into_iter().flatten() {
+            let mut neighbour = point.clone();
+            neighbour[axis] = index;
+            let neighbour = problem.bounds.clamp(&neighbour);
+            if !found.contains(&neighbour) {
+                found.push(neighbour);
+            }
+        }
+    }
+    found
+}
+
+fn stopped() -> RemapError {
+    RemapError::Search(SearchError::Objective(Box::new(Stopped)))
+}
+
+impl CrossStage {
+    /// Finds the target of a source point; one that cannot be rendered makes an entry that says so.
+    pub(crate) fn find(
+        &self,
+        plan: &Plan,
+        values: &[f64],
+        problem: &Problem,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Matched, RemapError> {
+        match self.try_find(plan, values, problem, stop) {
+            Err(_) if stop() => Err(stopped()),
+            Err(RemapError::Render(reason)) => {
+                Ok(Matched { best: Point::new(), compared: 0, entry: Entry::failed(values.to_vec(), reason) })
+            }
+            other => other,
+        }
+    }
+
+    fn try_find(
+        &self,
+        plan: &Plan,
+        values: &[f64],
+        problem: &Problem,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Matched, RemapError> {
+        let Sampling { samples, most } = self.sampling;
+        let source = plan.source_material(values)?;
+        let seen = self.look(&source, true, samples)?;
+        let level = self.body_level(&source, &seen);
+        let rounded = self.carried(&source, level)?.rounded_albedo();
+        let mut objective = CrossMatch {
+            plan,
+            stage: self,
+            lattice: problem.lattice,
+            source: rounded,
+            seen: seen.clone(),
+            scores: HashMap::new(),
+            stop,
+        };
+        let found = searched(plan, problem, &mut objective)?;
+        if found.fitness >= FAILED {
+            let reasons = self.counts().into_iter().flat_map(|(_, counts)| counts.reasons);
+            return Err(RemapError::Render(reasons.last().unwrap_or_else(|| "no target could be rendered".into())));
+        }
+        let (best, is_decided) = objective.settled(&found.best, problem, most)?;
+        let compared = objective.scores.len();
+        let target_values = problem.lattice.values(&best);
+        let (target, body) = self.with_body(plan, &source, &target_values, level)?;
+        let score = self.score(&seen, &self.look(&target, true, samples)?, true);
+        let ([nrmsd, nrmsd_masked], floor) = self.nrmsd(&source, &target, samples)?;
+        let fitness = score.value.max(0.0);
+        let entry = Entry {
+            source: values.to_vec(),
+            target: target_values,
+            fitness,
+            nrmsd,
+            nrmsd_masked,
+            evaluations: compared,
+            saturated: crate::strategy::on_edge(problem.lattice, &best),
+            body: Some(body),
+            noise: Some(Noise { fitness: score.error, nrmsd: floor, is_decided }),
+            failed: None,
+        };
+        Ok(Matched { best, compared, entry })
+    }
+
+    /// A source with the albedo of its body as pictures show it, where formulas cannot tell it.
+    fn carried<'a>(&self, source: &'a Material, level: [f64; 3]) -> Result<SourceLook<'a>, RemapError> {
+        if source.model().renderer.is_none() {
+            return Ok(SourceLook::new(source));
+        }
+        let grey = Material::parse("lambert:diffuse=0.5")?;
+        let known = self.level(&[self.own.diffuse_planes(&grey)]);
+        let albedo = std::array::from_fn(|c| (0.5 * level[c] / known[c]).clamp(0.0, 1.0));
+        Ok(SourceLook::measured(source, albedo))
+    }
+
+    /// The target with a body as bright as the source's, and what its colour is of the source's.
+    fn with_body(
+        &self,
+        plan: &Plan,
+        source: &Material,
+        values: &[f64],
+        level: [f64; 3],
+    ) -> Result<(Material, [f64; 3]), RemapError> {
+        let look = self.carried(source, level)?;
+        if plan.to.model().renderer.is_none() {
+            let target = plan.target_with(&look, values, Body::Matched)?;
+            let gain = ratio(body_colour(&target), body_colour(source));
+            return Ok((target, gain));
+        }
+        let scaled = |gain| plan.target_with(&look, values, Body::Scaled(gain));
+        let mut gain = [1.0; 3];
+        let mut target = scaled(gain)?;
+        let is_same = std::ptr::eq(source.model(), target.model());
+        let are_lambert = [source, &target].iter().all(|m| m.by_role(Role::DiffuseReflectance).is_some());
+        if is_same || are_lambert || body_colour(&target) == [0.0; 3] {
+            return Ok((target, gain));
+        }
+        for _ in 0..BODY_STEPS {
+            let seen = self.look(&target, true, self.sampling.samples)?;
+            let step = ratio(level, self.body_level(&target, &seen));
+            if step.iter().all(|step| (step - 1.0).abs() < BODY_TOLERANCE) {
+                break;
+            }
+            gain = std::array::from_fn(|c| gain[c] * step[c]);
+            target = scaled(gain)?;
+        }
+        Ok((target, gain))
+    }
+}
+
+/// The colour of the body, as its parameter has it.
+fn body_colour(material: &Material) -> [f64; 3] {
+    let role = [Role::DiffuseReflectance, Role::BaseColour].into_iter().find_map(|role| material.by_role(role));
+    role.and_then(|value| value.colour()).unwrap_or([0.0; 3])
+}
+
+/// `a / b` where both are brighter than noise, else 1.
+fn ratio(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| if a[c] > 1e-6 && b[c] > 1e-6 { a[c] / b[c] } else { 1.0 })
+}
