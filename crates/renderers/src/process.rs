@@ -50,6 +50,9 @@ impl Launch {
     }
 }
 
+/// A request: its line and the bytes after it.
+type Packet = (Vec<u8>, Arc<[u8]>);
+
 /// What comes from a worker.
 #[derive(Debug)]
 pub(crate) enum Event {
@@ -64,7 +67,7 @@ pub(crate) enum Event {
 /// A running worker. Dropping it ends its whole group.
 pub(crate) struct Process {
     child: Child,
-    requests: Option<Sender<(Vec<u8>, Arc<[u8]>)>>,
+    requests: Option<Sender<Packet>>,
     events: Receiver<Event>,
     /// Bytes that may follow the next message.
     most_bytes: Arc<AtomicUsize>,
@@ -233,7 +236,7 @@ fn kill_marked(mark: &str) {
 #[cfg(not(target_os = "linux"))]
 fn kill_marked(_: &str) {}
 
-fn write_requests(mut stdin: ChildStdin, outbox: &Receiver<(Vec<u8>, Arc<[u8]>)>) {
+fn write_requests(mut stdin: ChildStdin, outbox: &Receiver<Packet>) {
     while let Ok((line, data)) = outbox.recv() {
         let written = stdin.write_all(&line).and_then(|()| stdin.write_all(&data));
         if written.and_then(|()| stdin.flush()).is_err() {

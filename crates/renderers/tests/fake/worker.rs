@@ -143,11 +143,12 @@ fn render(id: &Value, size: u64, material: &Value) {
         }
         "hang-with-children" => {
             // One in the group of the worker, and one in a group of its own, as browsers are.
-            Command::new("sleep").arg("3600").spawn().unwrap();
+            let mut beside = Command::new("sleep").arg("3600").spawn().unwrap();
             let mut alone = Command::new("sleep");
             std::os::unix::process::CommandExt::process_group(&mut alone, 0);
-            note(&format!("alone {}", alone.arg("3600").spawn().unwrap().id()));
-            sleep(Duration::from_secs(3600));
+            let mut alone = alone.arg("3600").spawn().unwrap();
+            note(&format!("alone {}", alone.id()));
+            beside.wait().and(alone.wait()).unwrap();
         }
         "garbage" => {
             eprintln!("saving");
