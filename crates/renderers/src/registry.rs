@@ -26,6 +26,7 @@ bundled! {
     "cycles": "cycles.py",
     "radiance": "radiance.py",
     "threejs": "threejs.mjs",
+    "povray": "povray.py",
 }
 
 /// What workers in Python share.
