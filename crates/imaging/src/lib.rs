@@ -12,6 +12,7 @@ mod file;
 mod image;
 mod lab;
 mod metrics;
+mod noisy;
 mod product;
 
 pub use atomic::write_atomically;
@@ -24,4 +25,5 @@ pub use lab::{lab_planes, lab_planes_of, squared_distance, weighted_squared_dist
 pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
 pub use metrics::mask::{Mask, disc_weight};
 pub use metrics::nrmsd::{nrmsd, nrmsd_pixels};
+pub use noisy::{Estimate, Neighbourhoods, NoisyLab};
 pub use product::{Columns, inner_product};

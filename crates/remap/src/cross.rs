@@ -9,16 +9,17 @@ use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lookmatch_imaging::{Image, lab_planes_of, nrmsd};
+use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd};
 use lookmatch_materials::{BlackBody, Material, Role};
 use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
 use lookmatch_search::{Lattice, Objective, ObjectiveError, Point, Problem, SearchError};
 use lru::LruCache;
+use rayon::prelude::*;
 
 use crate::carry::{Body, SourceLook};
 use crate::gallery::{Key, Stopped, key};
 use crate::probe::Noise;
-use crate::stage::{Appearance, LIGHTS};
+use crate::stage::LIGHTS;
 use crate::strategy::{Counting, Matched, searched};
 use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
 use crate::{Entry, Plan, RemapError, Stage};
@@ -45,35 +46,23 @@ pub struct CrossStage {
     sampling: Sampling,
     /// Weights of the subject's pixels: those of the mask, and 0 at silhouettes, where what is behind is nothing but noise.
     weights: Vec<f32>,
-    looks: Mutex<LruCache<Key, Arc<Taken>>>,
+    around: Neighbourhoods,
+    looks: Mutex<LruCache<Key, Arc<Look>>>,
 }
 
-/// What the metric knows of a material.
-#[derive(Clone)]
-enum Look {
-    /// One of ours: without noise.
-    Own(Arc<Appearance>),
-    Taken(Arc<Taken>),
-}
-
-/// A look made of pictures.
-struct Taken {
-    specular: [Noisy; 2],
+/// What the metric knows of a material, by light.
+struct Look {
+    specular: [NoisyLab; 2],
     diffuse: Option<Diffuse>,
+    /// Samples of its pictures; as many as can be of ours, which have no noise.
     samples: u32,
 }
 
 /// Diffuse pictures under both lights.
 struct Diffuse {
-    images: [Noisy; 2],
+    images: [NoisyLab; 2],
     /// Mean radiance under the environment, per channel.
     level: [f64; 3],
-}
-
-/// CIELAB planes of a picture: two with independent noise, or one without.
-struct Noisy {
-    first: Vec<f32>,
-    second: Option<Vec<f32>>,
 }
 
 /// A fitness and its standard error.
@@ -93,6 +82,11 @@ struct Recipe {
 }
 
 impl Recipe {
+    /// The materials whose pictures are needed.
+    fn materials(&self, whole: bool) -> impl Iterator<Item = &Material> {
+        self.specular.iter().chain(self.diffuse.iter().filter(move |_| whole)).map(|(_, material)| material)
+    }
+
     /// The diffuse reflection is what a black body takes away ([`Material::blackened`]).
     fn of(material: &Material) -> Self {
         match material.blackened() {
@@ -137,9 +131,11 @@ impl CrossStage {
         let mask = |k: usize| own.mask_weights().map_or(1.0, |mask| mask[k]);
         let weight = |(k, pixel): (usize, &u32)| if coverage[*pixel as usize] == 1.0 { mask(k) } else { 0.0 };
         let weights: Vec<f32> = subjects.map(weight).collect();
-        let bytes = 8 * 3 * weights.len() * size_of::<f32>();
+        let around = Neighbourhoods::new(own.views()[0].subjects(), plan.size);
+        // Two pictures, one smooth one and what is made of it, of two parts under two lights.
+        let bytes = 4 * 4 * 3 * weights.len() * size_of::<f32>();
         let room = NonZeroUsize::new(CAPACITY / bytes.max(1)).unwrap_or(NonZeroUsize::MIN);
-        Ok(Self { own, archives, sampling, weights, looks: Mutex::new(LruCache::new(room)) })
+        Ok(Self { own, archives, sampling, weights, around, looks: Mutex::new(LruCache::new(room)) })
     }
 
     /// What each renderer has cost so far, by name.
@@ -203,76 +199,91 @@ impl CrossStage {
         self.archives.iter().find(|archive| archive.studio.name() == renderer)
     }
 
-    /// Materials as they are seen, with their diffuse pictures if `whole`.
-    fn looks(&self, materials: &[Material], whole: bool, samples: u32) -> Vec<Result<Look, String>> {
-        let Some(archive) = materials.first().and_then(|first| self.archive(first)) else {
-            return self
-                .own
-                .known_appearances(materials)
-                .into_iter()
-                .map(|seen| Ok(Look::Own(seen)))
-                .collect();
-        };
-        let known: Vec<Option<Arc<Taken>>> =
-            materials.iter().map(|m| self.known(m, whole, samples)).collect();
-        let recipes: Vec<Recipe> = materials
-            .iter()
-            .zip(&known)
-            .filter(|(_, known)| known.is_none())
-            .map(|(m, _)| Recipe::of(m))
-            .collect();
-        let sums = |recipe: &'_ Recipe| -> Vec<Material> {
-            let diffuse = recipe.diffuse.iter().filter(|_| whole);
-            recipe.specular.iter().chain(diffuse).map(|(_, material)| material.clone()).collect()
-        };
-        let wanted: Vec<Material> = recipes.iter().flat_map(sums).collect();
-        let shots: Vec<(&Material, &'static str)> =
-            wanted.iter().flat_map(|material| SCENES.map(|scene| (material, scene))).collect();
-        let mut taken = archive.takes(&shots, samples).into_iter();
-        let mut recipes = recipes.iter();
-        let mut look = |(material, known): (&Material, Option<Arc<Taken>>)| {
+    /// Materials of one model as they are seen, with their diffuse pictures if `whole`.
+    fn looks(&self, materials: &[Material], whole: bool, samples: u32) -> Vec<Result<Arc<Look>, String>> {
+        let known: Vec<Option<Arc<Look>>> = materials.iter().map(|m| self.known(m, whole, samples)).collect();
+        let missing = materials.iter().zip(&known).filter(|(_, known)| known.is_none());
+        let missing: Vec<Material> = missing.map(|(material, _)| material.clone()).collect();
+        let mut new = match missing.first().and_then(|first| self.archive(first)) {
+            Some(archive) => self.taken(archive, &missing, whole, samples),
+            None => self.own_looks(&missing),
+        }
+        .into_iter();
+        let mut look = |(material, known): (&Material, Option<Arc<Look>>)| {
             if let Some(known) = known {
-                return Ok(Look::Taken(known));
+                return Ok(known);
             }
-            let recipe = recipes.next().ok_or("a material was lost")?;
-            let count = recipe.specular.len() + if whole { recipe.diffuse.len() } else { 0 };
-            let takes: Vec<Result<Arc<Takes>, String>> = taken.by_ref().take(2 * count).collect();
-            let takes = takes.into_iter().collect::<Result<Vec<_>, String>>()?;
-            let look = Arc::new(self.developed(recipe, &takes, whole, samples));
+            let look = Arc::new(new.next().unwrap_or_else(|| Err("a material was lost".into()))?);
             self.kept().put(key(material), look.clone());
-            Ok(Look::Taken(look))
+            Ok(look)
         };
         materials.iter().zip(known).map(&mut look).collect()
     }
 
-    fn look(&self, material: &Material, whole: bool, samples: u32) -> Result<Look, RemapError> {
+    /// Ours, without noise.
+    fn own_looks(&self, materials: &[Material]) -> Vec<Result<Look, String>> {
+        let planes = self.own.linear_planes(materials);
+        let prepared = |planes: [Planes; 2]| planes.map(|planes| NoisyLab::new(&[planes], &self.around));
+        let look = |[specular, diffuse]: [[Planes; 2]; 2]| {
+            let level = self.level(std::slice::from_ref(&diffuse[1]));
+            let diffuse = Some(Diffuse { level, images: prepared(diffuse) });
+            Ok(Look { specular: prepared(specular), diffuse, samples: u32::MAX })
+        };
+        planes.into_par_iter().map(look).collect()
+    }
+
+    /// Those of another renderer.
+    fn taken(
+        &self,
+        archive: &Archive,
+        materials: &[Material],
+        whole: bool,
+        samples: u32,
+    ) -> Vec<Result<Look, String>> {
+        let recipes: Vec<Recipe> = materials.iter().map(Recipe::of).collect();
+        let wanted: Vec<&Material> = recipes.iter().flat_map(|recipe| recipe.materials(whole)).collect();
+        let shots: Vec<(&Material, &'static str)> =
+            wanted.iter().flat_map(|material| SCENES.map(|scene| (*material, scene))).collect();
+        let mut taken = archive.takes(&shots, samples).into_iter();
+        let look = |recipe: &Recipe| {
+            let takes = taken.by_ref().take(2 * recipe.materials(whole).count());
+            let takes = takes.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, String>>()?;
+            Ok(self.developed(recipe, &takes, whole, samples))
+        };
+        recipes.iter().map(look).collect()
+    }
+
+    fn look(&self, material: &Material, whole: bool, samples: u32) -> Result<Arc<Look>, RemapError> {
         self.looks(std::slice::from_ref(material), whole, samples).swap_remove(0).map_err(RemapError::Render)
     }
 
-    fn kept(&self) -> std::sync::MutexGuard<'_, LruCache<Key, Arc<Taken>>> {
+    fn kept(&self) -> std::sync::MutexGuard<'_, LruCache<Key, Arc<Look>>> {
         // A panic elsewhere leaves nothing half-written in this map.
         self.looks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn known(&self, material: &Material, whole: bool, samples: u32) -> Option<Arc<Taken>> {
+    fn known(&self, material: &Material, whole: bool, samples: u32) -> Option<Arc<Look>> {
         let known = self.kept().get(&key(material)).cloned()?;
         (known.samples >= samples && (known.diffuse.is_some() || !whole)).then_some(known)
     }
 
     /// Adds up pictures; `takes` has both lights of each material of the recipe.
-    fn developed(&self, recipe: &Recipe, takes: &[Arc<Takes>], whole: bool, samples: u32) -> Taken {
+    fn developed(&self, recipe: &Recipe, takes: &[Arc<Takes>], whole: bool, samples: u32) -> Look {
         let of_light = |sum: &Sum, first: usize, light: usize| -> Vec<Planes> {
             let pictures: Vec<(f32, &Takes)> =
                 sum.iter().enumerate().map(|(k, (w, _))| (*w, &*takes[2 * (first + k) + light])).collect();
             let halves = pictures.iter().map(|(_, takes)| takes.halves.len()).max().unwrap_or(1);
             (0..halves).map(|half| self.summed(&pictures, half)).collect()
         };
-        let specular = [0, 1].map(|light| Noisy::of(&of_light(&recipe.specular, 0, light)));
+        let specular = [0, 1].map(|light| NoisyLab::new(&of_light(&recipe.specular, 0, light), &self.around));
         let diffuse = whole.then(|| {
             let planes = [0, 1].map(|light| of_light(&recipe.diffuse, recipe.specular.len(), light));
-            Diffuse { level: self.level(&planes[1]), images: planes.map(|planes| Noisy::of(&planes)) }
+            Diffuse {
+                level: self.level(&planes[1]),
+                images: planes.map(|planes| NoisyLab::new(&planes, &self.around)),
+            }
         });
-        Taken { specular, diffuse, samples }
+        Look { specular, diffuse, samples }
     }
 
     /// A sum of pictures on the subject's pixels.
@@ -300,28 +311,20 @@ impl CrossStage {
         })
     }
 
-    /// The brightness of a material's body under the environment.
-    fn body_level(&self, material: &Material, look: &Look) -> [f64; 3] {
-        match look {
-            Look::Taken(taken) => taken.diffuse.as_ref().map_or([0.0; 3], |diffuse| diffuse.level),
-            Look::Own(_) => self.level(&[self.own.diffuse_planes(material)]),
-        }
-    }
-
     /// Equation 3 between two looks.
     fn score(&self, a: &Look, b: &Look, with_diffuse: bool) -> Score {
-        let parts = if with_diffuse { 2 } else { 1 };
+        let diffuse = a.diffuse.as_ref().zip(b.diffuse.as_ref()).filter(|_| with_diffuse);
+        let parts = [Some((&a.specular, &b.specular)), diffuse.map(|(a, b)| (&a.images, &b.images))];
+        let pixels = (self.own.size() * self.own.size()) as f64;
         let (mut value, mut variance) = (0.0, 0.0);
-        for (part, weights) in self.own.part_weights().into_iter().enumerate().take(parts) {
-            for (light, weight) in weights.into_iter().enumerate() {
-                let (Some(a), Some(b)) = (a.planes(part, light), b.planes(part, light)) else { continue };
-                let (sum, error) = product_of_differences(a, b, &self.weights);
-                let pixels = (self.own.size() * self.own.size()) as f64;
-                let root = (sum.abs() / pixels).sqrt();
-                value += weight * root.copysign(sum);
+        for (part, weights) in parts.into_iter().zip(self.own.part_weights()) {
+            let Some((a, b)) = part else { continue };
+            for light in 0..2 {
+                let Estimate { sum, error } = a[light].squared_difference(&b[light], &self.weights);
+                value += weights[light] * (sum.abs() / pixels).sqrt().copysign(sum);
                 // Of the root, near 0 as well, where noise alone decides its size.
                 let slope = 0.5 / (sum.abs().max(error) / pixels).sqrt().max(1e-12);
-                variance += (weight * slope * error / pixels).powi(2);
+                variance += (weights[light] * slope * error / pixels).powi(2);
             }
         }
         Score { value, error: variance.sqrt() }
@@ -329,26 +332,9 @@ impl CrossStage {
 }
 
 impl Look {
-    /// Planes of the specular (0) or diffuse (1) picture under a light.
-    fn planes(&self, part: usize, light: usize) -> Option<(&[f32], Option<&[f32]>)> {
-        match self {
-            Self::Own(seen) => Some((seen.planes(part, light), None)),
-            Self::Taken(taken) => {
-                let images = if part == 0 { &taken.specular } else { &taken.diffuse.as_ref()?.images };
-                Some((&images[light].first, images[light].second.as_deref()))
-            }
-        }
-    }
-}
-
-impl Noisy {
-    fn of(halves: &[Planes]) -> Self {
-        let lab = |[r, g, b]: &Planes| {
-            let mut lab = vec![0.0; 3 * r.len()];
-            lab_planes_of([r, g, b], &mut lab);
-            lab
-        };
-        Self { first: lab(&halves[0]), second: halves.get(1).map(lab) }
+    /// The brightness of the body.
+    fn level(&self) -> [f64; 3] {
+        self.diffuse.as_ref().map_or([0.0; 3], |diffuse| diffuse.level)
     }
 }
 
@@ -362,37 +348,13 @@ fn noise(takes: &Takes) -> Option<Image> {
     Some(noise)
 }
 
-/// The sum of squared differences of two pictures without noise, estimated from two halves of each, and its standard error.
-///
-/// With differences `d₁ = x + n₁` and `d₂ = x + n₂` of independent noise, `E[d₁d₂] = x²`; its variance is `2x²σ² + σ⁴`, with
-/// `σ² = E[(d₁ − d₂)²]/2`.
-fn product_of_differences(
-    (a1, a2): (&[f32], Option<&[f32]>),
-    (b1, b2): (&[f32], Option<&[f32]>),
-    weights: &[f32],
-) -> (f64, f64) {
-    let is_noisy = a2.is_some() || b2.is_some();
-    let (a2, b2) = (a2.unwrap_or(a1), b2.unwrap_or(b1));
-    let (mut sum, mut variance) = (0.0f64, 0.0f64);
-    for k in 0..a1.len() {
-        let weight = f64::from(weights[k % weights.len()]);
-        let (d1, d2) = (f64::from(a1[k] - b1[k]), f64::from(a2[k] - b2[k]));
-        sum += weight * weight * d1 * d2;
-        if is_noisy {
-            let noise = (d1 - d2) * (d1 - d2) / 2.0;
-            variance += weight.powi(4) * (2.0 * (d1 * d2).max(0.0) * noise + noise * noise / 3.0);
-        }
-    }
-    (sum, variance.sqrt())
-}
-
 /// The fitness of target points against one source material.
 struct CrossMatch<'a> {
     plan: &'a Plan,
     stage: &'a CrossStage,
     lattice: &'a Lattice,
     source: SourceLook<'a>,
-    seen: Look,
+    seen: Arc<Look>,
     /// Points that were compared so far.
     scores: HashMap<Point, f64>,
     stop: &'a (dyn Fn() -> bool + Sync),
@@ -413,7 +375,7 @@ impl CrossMatch<'_> {
     fn scored(&self, points: &[Point], samples: u32) -> Result<Vec<Score>, RemapError> {
         let with_diffuse = self.body() == Body::Matched;
         let looks = self.stage.looks(&self.targets(points)?, false, samples);
-        let score = |look: Result<Look, String>| match look {
+        let score = |look: Result<Arc<Look>, String>| match look {
             Ok(look) => self.stage.score(&self.seen, &look, with_diffuse),
             Err(_) => Score { value: FAILED, error: 0.0 },
         };
@@ -528,7 +490,7 @@ impl CrossStage {
         let Sampling { samples, most } = self.sampling;
         let source = plan.source_material(values)?;
         let seen = self.look(&source, true, samples)?;
-        let level = self.body_level(&source, &seen);
+        let level = seen.level();
         let rounded = self.carried(&source, level)?.rounded_albedo();
         let mut objective = CrossMatch {
             plan,
@@ -550,7 +512,7 @@ impl CrossStage {
         let compared = objective.scores.len();
         let target_values = problem.lattice.values(&best);
         let (target, body) = self.with_body(plan, &source, &target_values, level)?;
-        let score = self.score(&seen, &self.look(&target, true, samples)?, true);
+        let score = self.score(&seen, &*self.look(&target, true, samples)?, true);
         let ([nrmsd, nrmsd_masked], floor) = self.nrmsd(&source, &target, samples)?;
         let fitness = score.value.max(0.0);
         let entry = Entry {
@@ -574,7 +536,7 @@ impl CrossStage {
             return Ok(SourceLook::new(source));
         }
         let grey = Material::parse("lambert:diffuse=0.5")?;
-        let known = self.level(&[self.own.diffuse_planes(&grey)]);
+        let known = self.look(&grey, true, 0)?.level();
         let albedo = std::array::from_fn(|c| (0.5 * level[c] / known[c]).clamp(0.0, 1.0));
         Ok(SourceLook::measured(source, albedo))
     }
@@ -603,7 +565,7 @@ impl CrossStage {
         }
         for _ in 0..BODY_STEPS {
             let seen = self.look(&target, true, self.sampling.samples)?;
-            let step = ratio(level, self.body_level(&target, &seen));
+            let step = ratio(level, seen.level());
             if step.iter().all(|step| (step - 1.0).abs() < BODY_TOLERANCE) {
                 break;
             }

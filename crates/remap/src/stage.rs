@@ -30,14 +30,6 @@ struct Images {
     environment: Vec<f32>,
 }
 
-impl Appearance {
-    /// Planes of the specular (0) or diffuse (1) picture under the point light (0) or the environment (1).
-    pub(crate) fn planes(&self, part: usize, light: usize) -> &[f32] {
-        let images = if part == 0 { &self.specular } else { &*self.diffuse };
-        if light == 0 { &images.point } else { &images.environment }
-    }
-}
-
 /// The lights of the reference scene, in the order of everything that is given for them.
 pub(crate) const LIGHTS: [Illumination; 2] = [Illumination::Point, Illumination::Environment];
 
@@ -161,10 +153,15 @@ impl Stage {
         self.weights.as_deref()
     }
 
-    /// Linear planes of a material's diffuse picture under the environment.
-    pub(crate) fn diffuse_planes(&self, material: &Material) -> Planes {
-        let lobes = SplitLobes::new(std::slice::from_ref(material));
-        self.environment.split_planes(&lobes).diffuse.swap_remove(lobes.diffuse_place(0))
+    /// Linear planes of materials: for each of them the specular (0) and the diffuse (1) picture, by light.
+    pub(crate) fn linear_planes(&self, materials: &[Material]) -> Vec<[[Planes; 2]; 2]> {
+        let lobes = SplitLobes::new(materials);
+        let split = self.views().map(|view| view.split_planes(&lobes));
+        let of = |k: usize| {
+            let place = lobes.diffuse_place(k);
+            [[0, 1].map(|l| split[l].specular[k].clone()), [0, 1].map(|l| split[l].diffuse[place].clone())]
+        };
+        (0..materials.len()).map(of).collect()
     }
 
     /// What a unit of distance between two specular images adds to the fitness, by light: point, environment.

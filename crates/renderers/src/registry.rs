@@ -24,6 +24,7 @@ macro_rules! bundled {
 bundled! {
     "mitsuba": "mitsuba.py",
     "cycles": "cycles.py",
+    "luxcore": "luxcore.py",
     "radiance": "radiance.py",
     "threejs": "threejs.mjs",
     "povray": "povray.py",

@@ -244,6 +244,8 @@ def trace(folder, octree, batches):
             if len(answer) < 12 * len(order):
                 raise RuntimeError(f"rtrace ended early, with status {process.wait()}; its message is in the log")
             yield order, np.frombuffer(answer, "<f4").reshape(-1, 3)
+        # Its children's seconds count only once it has waited for them itself.
+        process.wait()
     finally:
         process.kill()
         process.wait()
