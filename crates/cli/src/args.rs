@@ -45,6 +45,23 @@ pub(crate) struct Json {
     pub(crate) json: bool,
 }
 
+/// How other renderers are run, for commands that name models of theirs: RENDERER:MODEL.
+#[derive(Args)]
+pub(crate) struct RendererArgs {
+    /// Start a renderer by a command of your own instead of the installed one; any name will do
+    #[arg(long, value_name = "NAME=COMMAND", value_parser = renderer_command)]
+    pub(crate) renderer: Vec<(String, String)>,
+    /// Worker processes per renderer; one where it uses all cores itself, else as many as there are cores
+    #[arg(long, value_name = "NUMBER")]
+    pub(crate) workers: Option<usize>,
+    /// Seconds that a renderer may stay silent before it is started anew
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) time_limit: u64,
+    /// A file that the renderers' own messages are appended to
+    #[arg(long, value_name = "FILE")]
+    pub(crate) log: Option<PathBuf>,
+}
+
 #[derive(Args)]
 pub(crate) struct ModelsArgs {
     /// Only this model, with its presets
@@ -143,6 +160,14 @@ pub(crate) struct RemapArgs {
     /// Few source points and small pictures: a probe in seconds
     #[arg(long)]
     pub(crate) quick: bool,
+    /// Samples per pixel of other renderers' pictures
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) samples: u32,
+    /// Samples per pixel up to which they are refined where noise leaves open what is best
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) max_samples: u32,
+    #[command(flatten)]
+    pub(crate) renderers: RendererArgs,
     /// Validate too, and write tables and side-by-side pictures to this folder
     #[arg(long, value_name = "FOLDER")]
     pub(crate) report: Option<PathBuf>,
@@ -265,6 +290,15 @@ pub(crate) struct BenchArgs {
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) json: Json,
+}
+
+fn renderer_command(text: &str) -> Result<(String, String), String> {
+    let (name, command) = text.split_once('=').ok_or("expected NAME=COMMAND")?;
+    let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    if name.is_empty() || !name.chars().all(is_plain) {
+        return Err(format!("the name '{name}' may have lower case letters, digits and hyphens"));
+    }
+    Ok((name.to_owned(), command.to_owned()))
 }
 
 /// Splits `source.name` or `target.name` from its side.

@@ -7,6 +7,7 @@ mod args;
 mod bench;
 mod commands;
 mod output;
+mod renderers;
 mod report;
 mod transport;
 

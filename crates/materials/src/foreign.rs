@@ -122,7 +122,8 @@ impl Description {
                 return Err(format!("'{named}', to be surveyed or searched, is no number or colour of it"));
             }
         }
-        let texts = |list: &[String]| -> &'static [&'static str] { leaked(list.iter().map(|t| text(t)).collect()) };
+        let texts =
+            |list: &[String]| -> &'static [&'static str] { leaked(list.iter().map(|t| text(t)).collect()) };
         Ok(Box::leak(Box::new(Model {
             name: text(name),
             title: text(if self.title.is_empty() { name } else { &self.title }),

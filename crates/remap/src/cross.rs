@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use lookmatch_imaging::{Image, lab_planes_of, nrmsd};
 use lookmatch_materials::{BlackBody, Material, Role};
-use lookmatch_rendering::{Illumination, Observe, Part, Planes, Renderer, TransportCache};
+use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
 use lookmatch_search::{Lattice, Objective, ObjectiveError, Point, Problem, SearchError};
 use lru::LruCache;
 
@@ -43,8 +43,8 @@ pub struct CrossStage {
     own: Stage,
     archives: Vec<Archive>,
     sampling: Sampling,
-    /// What our subject pixels show beside the subject under both lights.
-    background: [Planes; 2],
+    /// Weights of the subject's pixels: those of the mask, and 0 at silhouettes, where what is behind is nothing but noise.
+    weights: Vec<f32>,
     looks: Mutex<LruCache<Key, Arc<Taken>>>,
 }
 
@@ -132,10 +132,14 @@ impl CrossStage {
             }
             archives.push(Archive::new(studio, plan.size, plan.seed));
         }
-        let background = own.views().map(Renderer::subject_background);
-        let bytes = 8 * 3 * background[0][0].len() * size_of::<f32>();
+        let coverage = plan.scene.coverage(plan.size);
+        let subjects = own.views()[0].subjects().iter().enumerate();
+        let mask = |k: usize| own.mask_weights().map_or(1.0, |mask| mask[k]);
+        let weight = |(k, pixel): (usize, &u32)| if coverage[*pixel as usize] == 1.0 { mask(k) } else { 0.0 };
+        let weights: Vec<f32> = subjects.map(weight).collect();
+        let bytes = 8 * 3 * weights.len() * size_of::<f32>();
         let room = NonZeroUsize::new(CAPACITY / bytes.max(1)).unwrap_or(NonZeroUsize::MIN);
-        Ok(Self { own, archives, sampling, background, looks: Mutex::new(LruCache::new(room)) })
+        Ok(Self { own, archives, sampling, weights, looks: Mutex::new(LruCache::new(room)) })
     }
 
     /// What each renderer has cost so far, by name.
@@ -153,7 +157,12 @@ impl CrossStage {
     ///
     /// # Errors
     /// Where it cannot be rendered.
-    pub fn picture(&self, material: &Material, light: Illumination, samples: u32) -> Result<(Image, Option<Image>), RemapError> {
+    pub fn picture(
+        &self,
+        material: &Material,
+        light: Illumination,
+        samples: u32,
+    ) -> Result<(Image, Option<Image>), RemapError> {
         let place = if light == Illumination::Point { 0 } else { 1 };
         let Some(archive) = self.archive(material) else {
             return Ok((self.own.views()[place].render(material, Part::Full), None));
@@ -197,11 +206,21 @@ impl CrossStage {
     /// Materials as they are seen, with their diffuse pictures if `whole`.
     fn looks(&self, materials: &[Material], whole: bool, samples: u32) -> Vec<Result<Look, String>> {
         let Some(archive) = materials.first().and_then(|first| self.archive(first)) else {
-            return self.own.known_appearances(materials).into_iter().map(|seen| Ok(Look::Own(seen))).collect();
+            return self
+                .own
+                .known_appearances(materials)
+                .into_iter()
+                .map(|seen| Ok(Look::Own(seen)))
+                .collect();
         };
-        let known: Vec<Option<Arc<Taken>>> = materials.iter().map(|m| self.known(m, whole, samples)).collect();
-        let recipes: Vec<Recipe> =
-            materials.iter().zip(&known).filter(|(_, known)| known.is_none()).map(|(m, _)| Recipe::of(m)).collect();
+        let known: Vec<Option<Arc<Taken>>> =
+            materials.iter().map(|m| self.known(m, whole, samples)).collect();
+        let recipes: Vec<Recipe> = materials
+            .iter()
+            .zip(&known)
+            .filter(|(_, known)| known.is_none())
+            .map(|(m, _)| Recipe::of(m))
+            .collect();
         let sums = |recipe: &'_ Recipe| -> Vec<Material> {
             let diffuse = recipe.diffuse.iter().filter(|_| whole);
             recipe.specular.iter().chain(diffuse).map(|(_, material)| material.clone()).collect()
@@ -242,28 +261,27 @@ impl CrossStage {
 
     /// Adds up pictures; `takes` has both lights of each material of the recipe.
     fn developed(&self, recipe: &Recipe, takes: &[Arc<Takes>], whole: bool, samples: u32) -> Taken {
-        let of_light = |sum: &Sum, first: usize, light: usize, background: f32| -> Vec<Planes> {
+        let of_light = |sum: &Sum, first: usize, light: usize| -> Vec<Planes> {
             let pictures: Vec<(f32, &Takes)> =
                 sum.iter().enumerate().map(|(k, (w, _))| (*w, &*takes[2 * (first + k) + light])).collect();
             let halves = pictures.iter().map(|(_, takes)| takes.halves.len()).max().unwrap_or(1);
-            (0..halves).map(|half| self.summed(&pictures, half, light, background)).collect()
+            (0..halves).map(|half| self.summed(&pictures, half)).collect()
         };
-        // A specular picture is without what is behind the subject, a diffuse one has it.
-        let specular = [0, 1].map(|light| Noisy::of(&of_light(&recipe.specular, 0, light, -1.0)));
+        let specular = [0, 1].map(|light| Noisy::of(&of_light(&recipe.specular, 0, light)));
         let diffuse = whole.then(|| {
-            let planes = [0, 1].map(|light| of_light(&recipe.diffuse, recipe.specular.len(), light, 1.0));
+            let planes = [0, 1].map(|light| of_light(&recipe.diffuse, recipe.specular.len(), light));
             Diffuse { level: self.level(&planes[1]), images: planes.map(|planes| Noisy::of(&planes)) }
         });
         Taken { specular, diffuse, samples }
     }
 
     /// A sum of pictures on the subject's pixels.
-    fn summed(&self, pictures: &[(f32, &Takes)], half: usize, light: usize, background: f32) -> Planes {
-        let behind = &self.background[light];
-        let mut planes: Planes = std::array::from_fn(|c| behind[c].iter().map(|b| background * b).collect());
+    fn summed(&self, pictures: &[(f32, &Takes)], half: usize) -> Planes {
+        let subjects = self.own.views()[0].subjects();
+        let mut planes: Planes = std::array::from_fn(|_| vec![0.0; subjects.len()]);
         for (weight, takes) in pictures {
             let image = &takes.halves[half.min(takes.halves.len() - 1)];
-            for (k, pixel) in self.own.views()[light].subjects().iter().enumerate() {
+            for (k, pixel) in subjects.iter().enumerate() {
                 let value = image.pixels()[*pixel as usize];
                 (0..3).for_each(|c| planes[c][k] += weight * value[c]);
             }
@@ -271,14 +289,14 @@ impl CrossStage {
         planes
     }
 
-    /// Mean of diffuse pictures under the environment without what is behind the subject.
+    /// Weighted mean of diffuse pictures under the environment.
     fn level(&self, halves: &[Planes]) -> [f64; 3] {
-        let behind = &self.background[1];
+        let total = halves.len() as f64 * self.weights.iter().copied().map(f64::from).sum::<f64>();
         std::array::from_fn(|c| {
             let sum = |planes: &Planes| -> f64 {
-                planes[c].iter().zip(&behind[c]).map(|(value, behind)| f64::from(value - behind)).sum()
+                planes[c].iter().zip(&self.weights).map(|(value, weight)| f64::from(value * weight)).sum()
             };
-            halves.iter().map(sum).sum::<f64>() / (halves.len() * behind[c].len()) as f64
+            halves.iter().map(sum).sum::<f64>() / total
         })
     }
 
@@ -297,7 +315,7 @@ impl CrossStage {
         for (part, weights) in self.own.part_weights().into_iter().enumerate().take(parts) {
             for (light, weight) in weights.into_iter().enumerate() {
                 let (Some(a), Some(b)) = (a.planes(part, light), b.planes(part, light)) else { continue };
-                let (sum, error) = product_of_differences(a, b, self.own.mask_weights());
+                let (sum, error) = product_of_differences(a, b, &self.weights);
                 let pixels = (self.own.size() * self.own.size()) as f64;
                 let root = (sum.abs() / pixels).sqrt();
                 value += weight * root.copysign(sum);
@@ -351,14 +369,13 @@ fn noise(takes: &Takes) -> Option<Image> {
 fn product_of_differences(
     (a1, a2): (&[f32], Option<&[f32]>),
     (b1, b2): (&[f32], Option<&[f32]>),
-    mask: Option<&[f32]>,
+    weights: &[f32],
 ) -> (f64, f64) {
     let is_noisy = a2.is_some() || b2.is_some();
     let (a2, b2) = (a2.unwrap_or(a1), b2.unwrap_or(b1));
-    let pixels = a1.len() / 3;
     let (mut sum, mut variance) = (0.0f64, 0.0f64);
     for k in 0..a1.len() {
-        let weight = mask.map_or(1.0, |mask| f64::from(mask[k % pixels]));
+        let weight = f64::from(weights[k % weights.len()]);
         let (d1, d2) = (f64::from(a1[k] - b1[k]), f64::from(a2[k] - b2[k]));
         sum += weight * weight * d1 * d2;
         if is_noisy {
@@ -525,7 +542,9 @@ impl CrossStage {
         let found = searched(plan, problem, &mut objective)?;
         if found.fitness >= FAILED {
             let reasons = self.counts().into_iter().flat_map(|(_, counts)| counts.reasons);
-            return Err(RemapError::Render(reasons.last().unwrap_or_else(|| "no target could be rendered".into())));
+            return Err(RemapError::Render(
+                reasons.last().unwrap_or_else(|| "no target could be rendered".into()),
+            ));
         }
         let (best, is_decided) = objective.settled(&found.best, problem, most)?;
         let compared = objective.scores.len();
@@ -597,7 +616,8 @@ impl CrossStage {
 
 /// The colour of the body, as its parameter has it.
 fn body_colour(material: &Material) -> [f64; 3] {
-    let role = [Role::DiffuseReflectance, Role::BaseColour].into_iter().find_map(|role| material.by_role(role));
+    let role =
+        [Role::DiffuseReflectance, Role::BaseColour].into_iter().find_map(|role| material.by_role(role));
     role.and_then(|value| value.colour()).unwrap_or([0.0; 3])
 }
 

@@ -22,7 +22,8 @@ pub(crate) type Key = Vec<u64>;
 
 pub(crate) fn key(material: &Material) -> Key {
     let is_known = material.model().renderer.is_none();
-    if is_known && material.by_role(Role::SpecularReflectance).is_some_and(|scale| scale.mean() == Some(0.0)) {
+    if is_known && material.by_role(Role::SpecularReflectance).is_some_and(|scale| scale.mean() == Some(0.0))
+    {
         let bsdf = material.bsdf();
         if bsdf.sampling().is_none() {
             return bsdf.diffuse().map(f64::to_bits).to_vec();

@@ -7,9 +7,9 @@ use lookmatch_rendering::Scene;
 use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
 
-use crate::studio::{RendererRecord, Sampling};
 use crate::RemapError;
 use crate::carry::{Body, SourceLook, carry_over, metal};
+use crate::studio::{RendererRecord, Sampling};
 
 /// How the results of neighbouring source points are used (Guarnera *et al.* 2018, 3.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -124,7 +124,8 @@ impl Endpoint {
         Ok(if text.contains('@') { Self::Named(material) } else { Self::Model(material.model()) })
     }
 
-    fn model(&self) -> &'static Model {
+    /// Its model.
+    pub fn model(&self) -> &'static Model {
         match self {
             Self::Model(model) => model,
             Self::Named(material) => material.model(),

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use lookmatch_materials::{Role, Trend};
 use lookmatch_search::{
-    Bounds, Genetic, GeneticSettings, Lattice, Objective, Outcome, Point, Problem, Search, SearchError, by_name,
+    Bounds, Genetic, GeneticSettings, Lattice, Objective, Outcome, Point, Problem, Search, SearchError,
+    by_name,
 };
 use rayon::prelude::*;
 

@@ -253,7 +253,8 @@ impl Task<'_> {
             Some(known) => {
                 let total = known.samples + added;
                 let share = added as f32 / total as f32;
-                let halves = known.halves.iter().zip(&halves).map(|(old, new)| mixed(old, new, share)).collect();
+                let halves =
+                    known.halves.iter().zip(&halves).map(|(old, new)| mixed(old, new, share)).collect();
                 Takes { halves, samples: total }
             }
         }
@@ -264,10 +265,9 @@ impl Task<'_> {
 ///
 /// # Errors
 /// Where none of them does.
-pub(crate) fn studio_of(
-    studios: &[Arc<dyn Studio>],
-    renderer: &str,
-) -> Result<Arc<dyn Studio>, RemapError> {
+pub(crate) fn studio_of(studios: &[Arc<dyn Studio>], renderer: &str) -> Result<Arc<dyn Studio>, RemapError> {
     let found = studios.iter().find(|studio| studio.name() == renderer);
-    found.cloned().ok_or_else(|| RemapError::Option(format!("the renderer '{renderer}' has not been started")))
+    found
+        .cloned()
+        .ok_or_else(|| RemapError::Option(format!("the renderer '{renderer}' has not been started")))
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // /// script
-// requires-node = ">=20"
+// requires-node = ">=20.6"
 // dependencies = ["three@0.187.0", "puppeteer-core@25.16.0"]
 // [tool.lookmatch]
 // title = "three.js"
@@ -121,7 +121,7 @@ const HELLO = {
     mirror: { model: "physical", values: { ...defaults(MODELS[0]), color: [1, 1, 1], metalness: 1, roughness: 0 } },
   },
   approximations: [
-    "The environment lights by the split-sum approximation: its picture is blurred beforehand (PMREM, 512 pixels a face) for light and view along the normal, so that reflections do not stretch at grazing angles; a Lambert ball is off by up to 4 %.",
+    "The environment lights by the split-sum approximation: its picture is blurred beforehand (PMREM, 512 pixels a face) for light and view along the normal, so that reflections do not stretch at grazing angles; a Lambert ball is off by up to 4 % under a map of large patches, by more under a small sun.",
     "Nothing is in the way of the environment: the plane lies without shade below the sphere.",
     "Sphere and plane do not see each other: neither is reflected in, nor lit by, the other.",
     "Roughness and clearcoatRoughness below 0.045 are 0.045, and the prefiltered environment has no finer pixels: mirrors are blurred.",
@@ -151,6 +151,7 @@ async function setUpPage() {
   renderer.shadowMap.type = THREE.BasicShadowMap;
   renderer.shadowMap.autoUpdate = false;
   renderer.autoClear = false;
+  renderer.setClearColor(0, 1);
 
   const scenes = new Map();
   const materials = {
@@ -199,7 +200,8 @@ async function setUpPage() {
 
   function environmentTexture({ width, height }, pixels) {
     const rgba = new Float32Array(4 * width * height);
-    for (let pixel = 0; pixel < width * height; pixel++) rgba.set(pixels.subarray(3 * pixel, 3 * pixel + 3), 4 * pixel);
+    for (let from = 0, to = 0; from < pixels.length; from += 3, to += 4)
+      for (let channel = 0; channel < 3; channel++) rgba[to + channel] = pixels[from + channel];
     const texture = new THREE.DataTexture(rgba, width, height, THREE.RGBAFormat, THREE.FloatType);
     texture.minFilter = texture.magFilter = THREE.LinearFilter;
     texture.wrapS = THREE.RepeatWrapping; // atan is negative in the left half of the map
@@ -347,7 +349,7 @@ async function setUpPage() {
     renderer.render(what, camera);
   }
 
-  /** Mean of `side` x `side` pictures, each shifted by a part of a pixel; RGB from the top row, in base 64. */
+  /** Mean of `side` x `side` pictures, each shifted by a part of a pixel; RGB from the top row, in base 64; null when the graphics are lost. */
   function render(name, side) {
     const kept = scenes.get(name);
     const { scene, balls, camera, size } = kept;
@@ -360,7 +362,9 @@ async function setUpPage() {
     adder.material.uniforms.picture.value = picture.texture;
     adder.material.uniforms.weight.value = 1 / (side * side);
     renderer.setRenderTarget(sum);
+    renderer.setClearAlpha(0);
     renderer.clear();
+    renderer.setClearAlpha(1);
     for (let place = 0; place < side * side; place++) {
       const x = ((place % side) + 0.5) / side - 0.5;
       const y = (Math.floor(place / side) + 0.5) / side - 0.5;
@@ -374,8 +378,8 @@ async function setUpPage() {
     renderer.readRenderTargetPixels(sum, 0, 0, size, size, pixels);
     picture.dispose();
     sum.dispose();
-    if (renderer.getContext().isContextLost()) throw new Error("Chromium lost its graphics context");
-    return topDown(pixels, size);
+    // All that is drawn is opaque. A graphics process that died leaves zeros, and says so only later.
+    return pixels[3] > 0.5 ? topDown(pixels, size) : null;
   }
 
   function topDown(rgba, size) {
@@ -408,19 +412,25 @@ function findChromium() {
   throw new Error("no chromium, chromium-browser or google-chrome in PATH: install one, or name it in LOOKMATCH_CHROMIUM");
 }
 
-/** A folder for Chromium's profile. A shell that waits for our end removes it, however we end. */
-function temporaryProfile() {
-  const profile = mkdtempSync(join(tmpdir(), "lookmatch-threejs-"));
-  const remover = spawn("sh", ["-c", 'cat; sleep 2; rm -rf "$0"', profile], { stdio: ["pipe", "ignore", "ignore"], detached: true });
-  remover.unref();
-  remover.stdin.unref?.();
-  return profile;
+/**
+ * A shell that waits for our end, however we end, then ends Chromium's process group, whose number it is told in a line, and removes
+ * its profile. By itself Chromium takes seconds to notice that we are gone, and those who kill us leave us no time to clean up.
+ */
+function startUndertaker(profile) {
+  const script = 'read group; cat; kill -s KILL -- "-$group"; sleep 1; rm -rf "$0"';
+  const undertaker = spawn("sh", ["-c", script, profile], { stdio: ["pipe", "ignore", "ignore"], detached: true });
+  undertaker.unref();
+  undertaker.stdin.unref();
+  return undertaker.stdin;
 }
 
 async function startChromium() {
+  const executablePath = findChromium();
+  const userDataDir = mkdtempSync(join(tmpdir(), "lookmatch-threejs-"));
+  const undertaker = startUndertaker(userDataDir);
   const browser = await puppeteer.launch({
-    executablePath: findChromium(),
-    userDataDir: temporaryProfile(),
+    executablePath,
+    userDataDir,
     pipe: true, // Chromium ends when we do
     protocolTimeout: 0, // lookmatch knows how long it wants to wait
     args: [
@@ -429,7 +439,10 @@ async function startChromium() {
       "--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run", "--disable-quic",
       "--host-resolver-rules=MAP * ~NOTFOUND",
     ],
+  }).catch((failure) => {
+    throw new Error(`${executablePath} did not start: ${failure.message}`);
   });
+  undertaker.write(`${browser.process().pid}\n`);
   browser.on("disconnected", () => stop("Chromium ended"));
   const page = (await browser.pages())[0];
   page.on("console", (message) => message.type() === "error" && console.error("page:", message.text()));
@@ -500,6 +513,7 @@ const requests = {
     const { page, inspector } = await chromium;
     const [cpu, wall] = [await cpuSeconds(inspector), performance.now()];
     const picture = await page.evaluate((scene, side) => worker.render(scene, side), scene, side);
+    if (picture === null) await stop("Chromium lost its graphics");
     const wall_s = (performance.now() - wall) / 1000;
     const cpu_s = (await cpuSeconds(inspector)) - cpu;
     return [{ width: size, height: size, samples: side * side, cpu_s, wall_s }, Buffer.from(picture, "base64")];
@@ -516,6 +530,7 @@ const requests = {
 console.log = console.info = console.error;
 
 let current; // id of the request being answered
+let stopping = false;
 
 /** Writes a JSON line and the bytes that follow it; returns once they are on their way. */
 function send(message, bytes = Buffer.alloc(0)) {
@@ -526,6 +541,7 @@ function send(message, bytes = Buffer.alloc(0)) {
 
 /** Ends a worker that can do no more. */
 async function stop(why) {
+  stopping = true;
   console.error(`threejs: ${why}`);
   if (current !== undefined) await send({ id: current, error: why });
   process.exit(1);
@@ -539,6 +555,7 @@ async function answer(request, bytes) {
     const [fields, data] = await handler(request, bytes);
     await send({ id: request.id, ...fields }, data);
   } catch (failure) {
+    if (stopping) return; // it has been answered
     if (!(failure instanceof Refused)) console.error(failure);
     await send({ id: request.id, error: failure.message });
   }

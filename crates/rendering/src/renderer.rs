@@ -7,7 +7,7 @@ use lookmatch_imaging::{Image, Mask};
 use lookmatch_materials::{Bsdf, Material, Role};
 use rayon::prelude::*;
 
-use crate::bodies::Body;
+use crate::bodies::{Bodies, Body};
 use crate::bounce::{Bounce, MODES, Weights};
 use crate::cache::{Observe, Progress, TransportCache};
 use crate::field::Field;
@@ -200,12 +200,6 @@ impl Renderer {
         &self.subjects
     }
 
-    /// What subject pixels show beside the subject, where they share it with what is behind.
-    pub fn subject_background(&self) -> Planes {
-        let value = |pixel: &u32, c: usize| self.background[*pixel as usize][c];
-        std::array::from_fn(|c| self.subjects.iter().map(|pixel| value(pixel, c)).collect())
-    }
-
     /// Side of the picture in pixels.
     pub fn size(&self) -> usize {
         self.film.size
@@ -350,6 +344,16 @@ impl Renderer {
 }
 
 impl Scene {
+    /// The share of each pixel of a picture that shows a sphere, 0 to 1, row 0 on top.
+    pub fn coverage(&self, size: usize) -> Vec<f32> {
+        let (film, bodies) = (Film::new(&self.camera, size), Bodies::new(self));
+        let share = |pixel: usize| {
+            let (points, count) = film.points(&bodies, pixel);
+            points.len() as f32 / count as f32
+        };
+        (0..size * size).into_par_iter().map(share).collect()
+    }
+
     /// The scene as materials of a model see it: without diffuse colours of the subjects where the model has no diffuse
     /// reflectance.
     pub fn for_model(&self, model: &lookmatch_materials::Model) -> Self {

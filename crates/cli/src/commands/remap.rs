@@ -1,28 +1,36 @@
 //! `lookmatch remap`: from two models to a probe.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use anyhow::Context;
+use lookmatch_materials::split_name;
 use lookmatch_remap::{
-    Assignment, Endpoint, Event, Options, Plan, Preset, Probe, Side, Stage, Strategy, journal_path, losses,
-    remap,
+    Assignment, Counts, CrossStage, Endpoint, Entry, Event, Noise, Options, Plan, Preset, Probe, RemapError,
+    Sampling, Side, Stage, Strategy, journal_path, losses, remap, remap_across,
 };
+use serde::Serialize;
 use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::{check_output, create_folder};
-use crate::output::{bar, loss_table, print_json};
+use crate::output::{bar, loss_table, print_json, score};
+use crate::renderers::{Renderers, interruption, renderer_of};
 use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
 
 pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
+    let stopped = interruption()?;
+    let named: Vec<String> = [&args.from, &args.to].into_iter().filter_map(|text| renderer_of(text)).collect();
+    let renderers = Renderers::start(&named, &args.renderers, &stopped)?;
     let (from, mut fix) = endpoint(&args.from, Side::Source)?;
     let (to, target_fix) = endpoint(&args.to, Side::Target)?;
     fix.extend(target_fix);
     fix.extend(args.fix.iter().cloned());
-    let plan = Plan::between(from, to, &options(args, fix))?;
+    let models = [from.model(), to.model()];
+    let options = Options { renderers: renderers.records(&models), ..options(args, fix) };
+    let plan = Plan::between(from, to, &options)?;
     check_output(&args.output)?;
     if let Some(folder) = &args.report {
         create_folder(folder)?;
@@ -33,40 +41,149 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         );
     }
     let started = Instant::now();
-    let probe = search(&plan, args)?;
+    let (probe, costs) = match named.is_empty() {
+        true => (search(&plan, args, &stopped)?, Vec::new()),
+        false => search_across(&plan, args, &renderers, &stopped)?,
+    };
     probe.write(&args.output)?;
     let seconds = started.elapsed().as_secs_f64();
-    let saturated = probe.entries.iter().filter(|e| !e.saturated.is_empty()).count();
-    let mean = probe.entries.iter().map(|e| e.fitness).sum::<f64>() / probe.entries.len() as f64;
+    let saturated = probe.found().filter(|e| !e.saturated.is_empty()).count();
+    let mean = probe.found().map(|e| e.fitness).sum::<f64>() / probe.found().count() as f64;
     eprintln!(
         "{}: {} source points in {seconds:.1} s, mean fitness {mean:.4}, {saturated} on the edge of a range",
         args.output.display(),
         probe.entries.len(),
     );
+    costs.iter().for_each(|cost| eprintln!("{}", cost.text()));
+    eprint!("{}", noise_text(&probe));
     let losses = losses(&probe)?;
     eprint!("{}", loss_table(&losses));
     let validation = match &args.report {
-        Some(folder) => Some(report::write(&probe, folder)?),
-        None => None,
+        Some(folder) if named.is_empty() => Some(report::write(&probe, folder)?),
+        _ => None,
     };
     if args.json.json {
         let summary = json!({
             "probe": args.output, "source_points": probe.entries.len(), "seconds": seconds,
             "evaluations": probe.totals.evaluations, "lattice_points": probe.totals.lattice_points,
             "mean_fitness": mean, "saturated": saturated, "losses": losses, "validation": validation,
+            "renderers": costs, "failed": probe.entries.len() - probe.found().count(),
         });
         return print_json(&summary);
     }
     Ok(())
 }
 
-fn search(plan: &Plan, args: &RemapArgs) -> anyhow::Result<Probe> {
-    let stopped = Arc::new(AtomicBool::new(false));
-    let flag = stopped.clone();
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+/// What pictures of a renderer have cost.
+#[derive(Debug, Serialize)]
+struct Cost {
+    name: String,
+    version: String,
+    renders: usize,
+    failed: usize,
+    /// Time that was spent waiting for it.
+    renderer_s: f64,
+    /// All other time of the search, with that of the other renderer.
+    rest_s: f64,
+    cpu_s: f64,
+    restarts: u64,
+    reasons: Vec<String>,
+}
+
+impl Cost {
+    fn text(&self) -> String {
+        let Self { name, version, renders, renderer_s, cpu_s, .. } = self;
+        let failed = match self.failed {
+            0 => String::new(),
+            failed => format!(", {failed} of them failed ({})", self.reasons.join("; ")),
+        };
+        let restarts = if self.restarts > 0 { format!(", {} restarts", self.restarts) } else { String::new() };
+        format!("{name} {version}: {renders} renders{failed}{restarts}, {renderer_s:.1} s waited for it ({cpu_s:.1} CPU s)")
+    }
+}
+
+/// The search with other renderers, and what they cost.
+fn search_across(
+    plan: &Plan,
+    args: &RemapArgs,
+    renderers: &Renderers,
+    stopped: &Arc<AtomicBool>,
+) -> anyhow::Result<(Probe, Vec<Cost>)> {
+    let preparation = Preparation::of("the reference scene");
+    let observe = |progress| preparation.observe(progress);
+    let stage = CrossStage::cached(plan, &renderers.studios(), &cache(), &observe)?;
+    preparation.finish();
+    let begun = Instant::now();
+    let probe = with_progress(plan, args, stopped, &mut |state, observe, stop| {
+        remap_across(plan, &stage, Some(state), observe, stop)
+    })?;
+    let all = begun.elapsed().as_secs_f64();
+    let counts = stage.counts();
+    let waited: f64 = counts.iter().map(|(_, counts)| counts.waited.as_secs_f64()).sum();
+    let usage = renderers.usage();
+    let cost = |(name, counts): (String, Counts)| {
+        let usage = usage.iter().find(|(other, _)| *other == name).map(|(_, usage)| usage);
+        let version = plan.renderers.iter().find(|record| record.name == name);
+        Cost {
+            version: version.map(|record| record.version.clone()).unwrap_or_default(),
+            name,
+            renders: counts.renders,
+            failed: counts.failed,
+            renderer_s: counts.waited.as_secs_f64(),
+            rest_s: all - waited,
+            cpu_s: usage.map_or(0.0, |usage| usage.cpu_s),
+            restarts: usage.map_or(0, |usage| usage.restarts),
+            reasons: counts.reasons,
+        }
+    };
+    let costs: Vec<Cost> = counts.into_iter().map(cost).collect();
+    eprintln!("{:.1} s in renderers, {:.1} s in our own code ({:.1} %)", waited, all - waited, 100.0 * (all - waited) / all);
+    Ok((probe, costs))
+}
+
+/// What noise leaves unknown, and what failed.
+fn noise_text(probe: &Probe) -> String {
+    let mut text = String::new();
+    let noises: Vec<_> = probe.found().filter_map(|e| e.noise.map(|noise| (e, noise))).collect();
+    if !noises.is_empty() && noises.iter().any(|(_, noise)| noise.nrmsd != [0.0; 3]) {
+        let mean = |value: &dyn Fn(&(&Entry, Noise)) -> [f64; 3]| {
+            noises.iter().map(|n| value(n).iter().sum::<f64>() / 3.0).sum::<f64>() / noises.len() as f64
+        };
+        let open = noises.iter().filter(|(_, noise)| !noise.is_decided).count();
+        text += &format!(
+            "mean NRMSD {}, noise alone {}; {open} of {} matches are as good as a neighbour within noise\n",
+            score(mean(&|(e, _)| e.nrmsd)),
+            score(mean(&|(_, n)| n.nrmsd)),
+            noises.len()
+        );
+    }
+    for entry in &probe.entries {
+        if let Some(reason) = &entry.failed {
+            text += &format!("failed: {:?}: {reason}\n", entry.source);
+        }
+    }
+    text
+}
+
+fn search(plan: &Plan, args: &RemapArgs, stopped: &Arc<AtomicBool>) -> anyhow::Result<Probe> {
     let preparation = Preparation::of("the reference scene");
     let stage = Stage::cached(plan, &cache(), &|progress| preparation.observe(progress))?;
     preparation.finish();
+    with_progress(plan, args, stopped, &mut |state, observe, stop| {
+        remap(plan, &stage, Some(state), observe, stop)
+    })
+}
+
+/// A search: its state file, what it tells, when it stops.
+type Run<'a> =
+    dyn FnMut(&Path, &mut dyn FnMut(Event), &(dyn Fn() -> bool + Sync)) -> Result<Probe, RemapError> + 'a;
+
+fn with_progress(
+    plan: &Plan,
+    args: &RemapArgs,
+    stopped: &Arc<AtomicBool>,
+    run: &mut Run,
+) -> anyhow::Result<Probe> {
     let total = plan.source_axes.iter().map(|axis| axis.len()).product();
     let progress = bar(total, "matching");
     let mut observe = |event: Event| match event {
@@ -82,7 +199,7 @@ fn search(plan: &Plan, args: &RemapArgs) -> anyhow::Result<Probe> {
     };
     let state = journal_path(&args.output);
     let stop = || stopped.load(Ordering::Relaxed);
-    let probe = remap(plan, &stage, Some(&state), &mut observe, &stop)?;
+    let probe = run(&state, &mut observe, &stop)?;
     progress.finish_and_clear();
     Ok(probe)
 }
@@ -101,12 +218,14 @@ fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
         mask: args.mask,
         quick: args.quick,
         size: args.size,
+        sampling: Sampling { samples: args.samples, most: args.max_samples.max(args.samples) },
+        renderers: Vec::new(),
     }
 }
 
 /// A model or a named material with values to hold: `ward`, `ward:variant=duer` or `low-abc@chrome`.
 fn endpoint(text: &str, side: Side) -> anyhow::Result<(Endpoint, Vec<Assignment>)> {
-    let (name, list) = text.split_once(':').unwrap_or((text, ""));
+    let (name, list) = split_name(text);
     let mut fix = Vec::new();
     for item in list.split(',').filter(|item| !item.is_empty()) {
         let (name, value) =

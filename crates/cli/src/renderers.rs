@@ -1,0 +1,189 @@
+//! Other renderers at the command line: which ones a command needs, their start, and their pictures.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::Context;
+use lookmatch_imaging::Image;
+use lookmatch_materials::{Description, Material, Model, by_name, split_name};
+use lookmatch_remap::{RendererRecord, Shot, Studio};
+use lookmatch_renderers::{Bundled, Installations, Job, Launch, Pool, PoolOptions, Stop};
+use lookmatch_rendering::{Illumination, Scene};
+
+use crate::Usage;
+use crate::args::RendererArgs;
+use crate::output::spinner;
+
+/// A flag that Ctrl-C raises. Asked for once, by commands that end their work in order.
+pub(crate) fn interruption() -> anyhow::Result<Arc<AtomicBool>> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = stopped.clone();
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+    Ok(stopped)
+}
+
+/// The renderer that a material's text names, `RENDERER:MODEL…`; `None` for ours.
+pub(crate) fn renderer_of(text: &str) -> Option<String> {
+    let json = match text.trim_start().starts_with('{') {
+        true => Some(text.to_owned()),
+        false if text.ends_with(".json") => std::fs::read_to_string(text).ok(),
+        false => None,
+    };
+    let name = match json {
+        Some(json) => serde_json::from_str::<serde_json::Value>(&json).ok()?.get("model")?.as_str()?.to_owned(),
+        None => split_name(text).0.to_owned(),
+    };
+    let (renderer, _) = name.split_once(':')?;
+    (by_name(renderer).is_err()).then(|| renderer.to_owned())
+}
+
+/// How a renderer is started: as the user says, or as it was installed.
+pub(crate) fn launch(name: &str, commands: &[(String, String)]) -> anyhow::Result<Launch> {
+    match commands.iter().find(|(given, _)| given == name) {
+        Some((_, command)) => launch_command(command),
+        None => Ok(Installations::of_user()?.launch(Bundled::find(name)?)?),
+    }
+}
+
+/// A command line as a shell would split it.
+pub(crate) fn launch_command(command: &str) -> anyhow::Result<Launch> {
+    let words = shlex::split(command).filter(|words| !words.is_empty());
+    let mut words = words
+        .ok_or_else(|| Usage(format!("'{command}' is no command; quotes must be closed")))?
+        .into_iter()
+        .map(OsString::from);
+    let program = words.next().map(PathBuf::from).unwrap_or_default();
+    Ok(Launch { program, args: words.collect(), env: Vec::new() })
+}
+
+/// Renderers at work.
+pub(crate) struct Renderers {
+    list: Vec<Arc<Hired>>,
+}
+
+/// One of them.
+struct Hired {
+    name: String,
+    pool: Pool,
+    models: Vec<Description>,
+}
+
+impl Renderers {
+    /// Starts the renderers of some names, and makes their models known.
+    pub(crate) fn start(names: &[String], args: &RendererArgs, stopped: &Arc<AtomicBool>) -> anyhow::Result<Self> {
+        let mut list: Vec<Arc<Hired>> = Vec::new();
+        for name in names {
+            if list.iter().any(|hired| hired.name == *name) {
+                continue;
+            }
+            let launch = launch(name, &args.renderer)?;
+            let progress = spinner(&format!("starting {name}"));
+            let flag = stopped.clone();
+            let stop: Stop = Arc::new(move || flag.load(Ordering::Relaxed));
+            let options = PoolOptions {
+                workers: args.workers,
+                time_limit: Duration::from_secs(args.time_limit),
+                log: args.log.clone(),
+                ..PoolOptions::default()
+            };
+            let hired = Hired::start(name, Pool::start(launch, options, stop)?)?;
+            progress.finish_and_clear();
+            list.push(Arc::new(hired));
+        }
+        Ok(Self { list })
+    }
+
+    /// For remaps.
+    pub(crate) fn studios(&self) -> Vec<Arc<dyn Studio>> {
+        self.list.iter().map(|hired| hired.clone() as Arc<dyn Studio>).collect()
+    }
+
+    /// What a probe keeps of them: the models that it speaks of.
+    pub(crate) fn records(&self, models: &[&Model]) -> Vec<RendererRecord> {
+        let record = |hired: &Arc<Hired>| {
+            let is_used = |d: &&Description| models.iter().any(|m| m.name == format!("{}:{}", hired.name, d.name));
+            RendererRecord {
+                name: hired.name.clone(),
+                version: hired.pool.hello().version.clone(),
+                models: hired.models.iter().filter(is_used).cloned().collect(),
+            }
+        };
+        self.list.iter().map(record).collect()
+    }
+
+    /// One picture of a material of theirs.
+    pub(crate) fn picture(
+        &self,
+        material: &Material,
+        (scene, light, size): (&Scene, Illumination, usize),
+        (samples, seed): (u32, u32),
+    ) -> anyhow::Result<Image> {
+        let name = material.model().renderer.context("the material is not one of another renderer")?;
+        let hired = self.list.iter().find(|hired| hired.name == name);
+        let hired = hired.with_context(|| format!("the renderer '{name}' has not been started"))?;
+        hired.set_scene("picture", scene, light, size).map_err(anyhow::Error::msg)?;
+        let shot = Shot { scene: "picture", material, samples, seed };
+        hired.render(&[shot]).swap_remove(0).map_err(anyhow::Error::msg)
+    }
+
+    /// Seconds that their processors worked, and pictures that had to be repeated.
+    pub(crate) fn usage(&self) -> Vec<(String, lookmatch_renderers::Usage)> {
+        self.list.iter().map(|hired| (hired.name.clone(), hired.pool.usage())).collect()
+    }
+}
+
+impl Hired {
+    fn start(name: &str, pool: Pool) -> anyhow::Result<Self> {
+        let read = |model: &serde_json::Value| {
+            let description: Description = serde_json::from_value(model.clone())
+                .with_context(|| format!("{name} describes a model in a way that is not understood: {model}"))?;
+            description.adopt(name)?;
+            anyhow::Ok(description)
+        };
+        let models = pool.hello().models.iter().map(read).collect::<anyhow::Result<_>>()?;
+        Ok(Self { name: name.to_owned(), pool, models })
+    }
+}
+
+impl Studio for Hired {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn version(&self) -> &str {
+        &self.pool.hello().version
+    }
+
+    fn models(&self) -> &[Description] {
+        &self.models
+    }
+
+    fn has_noise(&self) -> bool {
+        self.pool.hello().capabilities.noise
+    }
+
+    fn set_scene(&self, name: &str, scene: &Scene, light: Illumination, size: usize) -> Result<(), String> {
+        self.pool.scene(name, scene, light, size).map_err(|e| e.to_string())
+    }
+
+    fn render(&self, shots: &[Shot]) -> Vec<Result<Image, String>> {
+        let job = |shot: &Shot| {
+            let mut values = shot.material.to_json().as_object().cloned().unwrap_or_default();
+            values.remove("model");
+            let model = shot.material.model().name;
+            Job {
+                scene: shot.scene.to_owned(),
+                model: model.split_once(':').map_or(model, |(_, model)| model).to_owned(),
+                values,
+                samples: shot.samples,
+                seed: shot.seed,
+            }
+        };
+        let jobs: Vec<Job> = shots.iter().map(job).collect();
+        let pictures = self.pool.render(&jobs).into_iter();
+        pictures.map(|picture| picture.map(|p| p.image).map_err(|e| e.to_string())).collect()
+    }
+}
