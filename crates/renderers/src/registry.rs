@@ -24,7 +24,9 @@ macro_rules! bundled {
 bundled! {
     "mitsuba": "mitsuba.py",
     "cycles": "cycles.py",
+    "luxcore": "luxcore.py",
     "radiance": "radiance.py",
+    "povray": "povray.py",
     "threejs": "threejs.mjs",
 }
 

@@ -100,6 +100,16 @@ fn group(id: u32) -> Vec<u32> {
     members.collect()
 }
 
+/// Waits until all processes of some groups are gone.
+fn wait_for_end(workers: &[String], most: Duration) {
+    let alive = || workers.iter().flat_map(|id| group(id.parse().unwrap())).collect::<Vec<_>>();
+    let end = Instant::now() + most;
+    while !alive().is_empty() {
+        assert!(Instant::now() < end, "left: {:?}", alive());
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
 fn job(values: Value) -> Job {
     let Value::Object(values) = values else { panic!("values are an object") };
     Job { scene: "lit".into(), model: "fake".into(), values, samples: 4, seed: 1 }
@@ -432,16 +442,11 @@ fn killed_tool_leaves_nothing(worker: &[&str]) {
         assert!(Instant::now() < end, "the tool does not render");
         thread::sleep(Duration::from_millis(20));
     }
-    let workers: Vec<u32> = notes(folder.path(), "start").iter().map(|id| id.parse().unwrap()).collect();
-    let alive = || workers.iter().flat_map(|id| group(*id)).collect::<Vec<_>>();
-    assert!(!alive().is_empty());
+    let workers = notes(folder.path(), "start");
+    assert!(!group(workers[0].parse().unwrap()).is_empty());
     tool.kill().unwrap();
     tool.wait().unwrap();
-    let end = Instant::now() + Duration::from_secs(3);
-    while !alive().is_empty() {
-        assert!(Instant::now() < end, "left: {:?}", alive());
-        thread::sleep(Duration::from_millis(20));
-    }
+    wait_for_end(&workers, Duration::from_secs(3));
 }
 
 #[test]
