@@ -22,6 +22,8 @@ pub(crate) enum Command {
     Eval(EvalArgs),
     /// Render a material in a scene
     Render(RenderArgs),
+    /// List other renderers, install or remove them
+    Renderers(RenderersArgs),
     /// Find the probe that maps one model to another
     Remap(RemapArgs),
     /// Map every model to every other, and compare each probe with copied parameters
@@ -43,6 +45,31 @@ pub(crate) struct Json {
     /// Print one JSON document to standard output
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct RenderersArgs {
+    #[command(subcommand)]
+    pub(crate) command: Option<RenderersCommand>,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum RenderersCommand {
+    /// Install renderers, each into a private environment of its own
+    Install {
+        /// Names from the list
+        #[arg(required = true, value_name = "NAME")]
+        names: Vec<String>,
+    },
+    /// Remove installed renderers
+    Remove {
+        /// Names from the list
+        #[arg(required = true, value_name = "NAME")]
+        names: Vec<String>,
+    },
 }
 
 /// How other renderers are run, for commands that name models of theirs: RENDERER:MODEL.

@@ -20,6 +20,7 @@ use clap::Parser;
 use args::{Arguments, Command};
 use lookmatch_materials::MaterialError;
 use lookmatch_remap::RemapError;
+use lookmatch_renderers::InstallationError;
 
 /// Pictures come and go by the thousand. This allocator keeps their memory; the system's hands it back to the kernel, and
 /// every page of the next picture costs a fault again.
@@ -42,6 +43,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Models(args) => commands::models::run(&args),
         Command::Eval(args) => commands::eval::run(&args),
         Command::Render(args) => commands::render::run(&args),
+        Command::Renderers(args) => commands::renderers::run(&args),
         Command::Remap(args) => commands::remap::run(&args),
         Command::Apply(args) => commands::apply::run(&args),
         Command::Pairs(args) => commands::pairs::run(&args),
@@ -74,6 +76,9 @@ impl std::error::Error for Usage {}
 
 fn exit_code(error: &anyhow::Error) -> u8 {
     let usage = error.is::<Usage>()
+        || error
+            .downcast_ref::<InstallationError>()
+            .is_some_and(|e| matches!(e, InstallationError::Unknown { .. }))
         || error.downcast_ref::<MaterialError>().is_some_and(MaterialError::is_usage)
         || error.downcast_ref::<RemapError>().is_some_and(RemapError::is_usage);
     if usage { 2 } else { 1 }

@@ -33,7 +33,9 @@ pub(crate) fn renderer_of(text: &str) -> Option<String> {
         false => None,
     };
     let name = match json {
-        Some(json) => serde_json::from_str::<serde_json::Value>(&json).ok()?.get("model")?.as_str()?.to_owned(),
+        Some(json) => {
+            serde_json::from_str::<serde_json::Value>(&json).ok()?.get("model")?.as_str()?.to_owned()
+        }
         None => split_name(text).0.to_owned(),
     };
     let (renderer, _) = name.split_once(':')?;
@@ -73,7 +75,11 @@ struct Hired {
 
 impl Renderers {
     /// Starts the renderers of some names, and makes their models known.
-    pub(crate) fn start(names: &[String], args: &RendererArgs, stopped: &Arc<AtomicBool>) -> anyhow::Result<Self> {
+    pub(crate) fn start(
+        names: &[String],
+        args: &RendererArgs,
+        stopped: &Arc<AtomicBool>,
+    ) -> anyhow::Result<Self> {
         let mut list: Vec<Arc<Hired>> = Vec::new();
         for name in names {
             if list.iter().any(|hired| hired.name == *name) {
@@ -104,7 +110,8 @@ impl Renderers {
     /// What a probe keeps of them: the models that it speaks of.
     pub(crate) fn records(&self, models: &[&Model]) -> Vec<RendererRecord> {
         let record = |hired: &Arc<Hired>| {
-            let is_used = |d: &&Description| models.iter().any(|m| m.name == format!("{}:{}", hired.name, d.name));
+            let is_used =
+                |d: &&Description| models.iter().any(|m| m.name == format!("{}:{}", hired.name, d.name));
             RendererRecord {
                 name: hired.name.clone(),
                 version: hired.pool.hello().version.clone(),
@@ -138,8 +145,9 @@ impl Renderers {
 impl Hired {
     fn start(name: &str, pool: Pool) -> anyhow::Result<Self> {
         let read = |model: &serde_json::Value| {
-            let description: Description = serde_json::from_value(model.clone())
-                .with_context(|| format!("{name} describes a model in a way that is not understood: {model}"))?;
+            let description: Description = serde_json::from_value(model.clone()).with_context(|| {
+                format!("{name} describes a model in a way that is not understood: {model}")
+            })?;
             description.adopt(name)?;
             anyhow::Ok(description)
         };

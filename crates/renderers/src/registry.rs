@@ -28,6 +28,7 @@ bundled! {
     "radiance": "radiance.py",
     "povray": "povray.py",
     "threejs": "threejs.mjs",
+    "povray": "povray.py",
 }
 
 /// What workers in Python share.

@@ -28,7 +28,6 @@ import lookmatch_worker as worker
 from lookmatch_worker import Refused, Timer, colour, number
 
 import math
-import os
 import re
 import shutil
 import subprocess
@@ -110,7 +109,6 @@ def checkerboard(plane):
 class PovRay:
     def __init__(self):
         self.program = shutil.which("povray")
-        self.folder = Path(tempfile.mkdtemp(prefix="lookmatch-povray-"))
         self.scenes = {}
         self.texture = None
 
@@ -170,26 +168,24 @@ class PovRay:
         side = max(1, min(round(math.sqrt(samples)), LARGEST // size))
         balls = [f"sphere {{ {vector(s['centre'])}, {s['radius']!r} {self.texture} }}\n" for s in spheres]
         head = "#version 3.7;\nglobal_settings { assumed_gamma 1 }\n"
-        (self.folder / "scene.pov").write_text(head + rest + "".join(balls))
         with Timer() as timer:
-            large = self.trace(side * size)
+            large = self.trace(head + rest + "".join(balls), side * size)
             pixels = large.reshape(size, side, size, side, 3).mean(axis=(1, 3), dtype=np.float64)
         return pixels, {"samples": side * side, **timer.info}
 
-    def trace(self, size):
-        """A picture of `scene.pov`, row 0 on top."""
-        # -D no window, +FE OpenEXR, -A no anti-aliasing; it may read and write in its current folder only.
+    def trace(self, description, size):
+        """A picture of the scene, row 0 on top."""
+        # -D no window, +FE OpenEXR, -A no anti-aliasing, -GA no messages. It may read and write in its current folder only.
         options = ["+Iscene.pov", "+Opicture.exr", "+FE", f"+W{size}", f"+H{size}", "-D", "-A", "-GA"]
-        done = subprocess.run([self.program, *options], cwd=self.folder, capture_output=True, text=True)
-        if done.returncode != 0:
-            raise RuntimeError(f"povray ended with status {done.returncode}: {' '.join(done.stderr.split()[-40:])}")
-        with OpenEXR.File(str(self.folder / "picture.exr")) as picture:
-            channels = picture.channels()
-            together = next((c for c in ("RGB", "RGBA") if c in channels), None)
-            return channels[together].pixels[..., :3].astype(np.float32)
-
-    def close(self):
-        shutil.rmtree(self.folder, ignore_errors=True)
+        with tempfile.TemporaryDirectory(prefix="lookmatch-povray-") as folder:
+            Path(folder, "scene.pov").write_text(description)
+            done = subprocess.run([self.program, *options], cwd=folder, capture_output=True, text=True)
+            if done.returncode != 0:
+                raise RuntimeError(f"povray ended with status {done.returncode}: {' '.join(done.stderr.split()[-40:])}")
+            with OpenEXR.File(str(Path(folder, "picture.exr"))) as picture:
+                channels = picture.channels()
+                colours = channels["RGB"] if "RGB" in channels else channels["RGBA"]
+                return colours.pixels[..., :3].astype(np.float32)
 
 
 worker.serve(PovRay())

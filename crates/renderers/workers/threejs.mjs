@@ -294,6 +294,8 @@ async function setUpPage() {
   }
 
   function setScene(described) {
+    const parts = received;
+    received = [];
     const scene = new THREE.Scene();
     const { spheres, plane, point_lights: lights, environment } = described;
     const balls = spheres.map(({ centre, radius }) => {
@@ -313,10 +315,9 @@ async function setUpPage() {
     }
     if (environment) {
       const bytes = new Uint8Array(12 * environment.width * environment.height);
-      received.reduce((start, part) => (bytes.set(part, start), start + part.length), 0);
+      parts.reduce((start, part) => (bytes.set(part, start), start + part.length), 0);
       addEnvironment(scene, environment, new Float32Array(bytes.buffer));
     }
-    received = [];
     if (scenes.has(described.scene)) dispose(scenes.get(described.scene));
     scenes.set(described.scene, { scene, balls, camera: makeCamera(described.camera), size: described.size, shaded: false });
   }
@@ -349,7 +350,7 @@ async function setUpPage() {
     renderer.render(what, camera);
   }
 
-  /** Mean of `side` x `side` pictures, each shifted by a part of a pixel; RGB from the top row, in base 64; null when the graphics are lost. */
+  /** Mean of `side` x `side` pictures, each shifted by a part of a pixel: RGB from the top row, in base 64; null if graphics are lost. */
   function render(name, side) {
     const kept = scenes.get(name);
     const { scene, balls, camera, size } = kept;
@@ -485,7 +486,8 @@ const requests = {
 
   async scene(request, environment) {
     const { scene, size, camera, spheres, plane, point_lights } = request;
-    if (point_lights.length > MOST_POINT_LIGHTS) throw new Refused(`point_lights: at most ${MOST_POINT_LIGHTS}, not ${point_lights.length}`);
+    if (point_lights.length > MOST_POINT_LIGHTS)
+      throw new Refused(`point_lights: at most ${MOST_POINT_LIGHTS}, not ${point_lights.length}`);
     if (size > 4096) throw new Refused(`size: at most 4096, not ${size}`);
     const { page } = await chromium;
     for (let start = 0; start < environment.length; start += PART)

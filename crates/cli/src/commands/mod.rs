@@ -9,6 +9,7 @@ pub(crate) mod models;
 pub(crate) mod pairs;
 pub(crate) mod remap;
 pub(crate) mod render;
+pub(crate) mod renderers;
 pub(crate) mod validate;
 
 use std::path::Path;

@@ -22,7 +22,8 @@ use crate::{Usage, report};
 
 pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
     let stopped = interruption()?;
-    let named: Vec<String> = [&args.from, &args.to].into_iter().filter_map(|text| renderer_of(text)).collect();
+    let named: Vec<String> =
+        [&args.from, &args.to].into_iter().filter_map(|text| renderer_of(text)).collect();
     let renderers = Renderers::start(&named, &args.renderers, &stopped)?;
     let (from, mut fix) = endpoint(&args.from, Side::Source)?;
     let (to, target_fix) = endpoint(&args.to, Side::Target)?;
@@ -97,8 +98,11 @@ impl Cost {
             0 => String::new(),
             failed => format!(", {failed} of them failed ({})", self.reasons.join("; ")),
         };
-        let restarts = if self.restarts > 0 { format!(", {} restarts", self.restarts) } else { String::new() };
-        format!("{name} {version}: {renders} renders{failed}{restarts}, {renderer_s:.1} s waited for it ({cpu_s:.1} CPU s)")
+        let restarts =
+            if self.restarts > 0 { format!(", {} restarts", self.restarts) } else { String::new() };
+        format!(
+            "{name} {version}: {renders} renders{failed}{restarts}, {renderer_s:.1} s waited for it ({cpu_s:.1} CPU s)"
+        )
     }
 }
 
@@ -137,7 +141,12 @@ fn search_across(
         }
     };
     let costs: Vec<Cost> = counts.into_iter().map(cost).collect();
-    eprintln!("{:.1} s in renderers, {:.1} s in our own code ({:.1} %)", waited, all - waited, 100.0 * (all - waited) / all);
+    eprintln!(
+        "{:.1} s in renderers, {:.1} s in our own code ({:.1} %)",
+        waited,
+        all - waited,
+        100.0 * (all - waited) / all
+    );
     Ok((probe, costs))
 }
 
