@@ -334,7 +334,7 @@ impl<'a> Place<'a> {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), InstallationError> {
         let (packages, folder) = (self.recipe.dependencies.join(" "), self.folder.display());
-        observe(&format!("installing {packages} in {folder}"));
+        observe(&format!("installing {} ({packages}) in {folder}", self.recipe.details().title));
         if self.recipe.requires_node.is_some() {
             self.make_node(stop)
         } else {

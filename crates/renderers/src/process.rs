@@ -28,6 +28,8 @@ const LAST_WORDS: usize = 40;
 const QUOTED: usize = 3;
 /// Messages that may wait to be looked at; a worker that writes more has to wait.
 const WAITING: usize = 16;
+/// How long what an ended worker wrote may be on its way.
+const LAST_MESSAGE: Duration = Duration::from_millis(200);
 /// The variable that marks the environment of a worker and of all that it starts.
 const MARK: &str = "LOOKMATCH_WORKER";
 
@@ -131,8 +133,10 @@ impl Process {
     pub(crate) fn receive(&self, wait: Duration) -> Option<Event> {
         match self.events.recv_timeout(wait) {
             Ok(event) => Some(event),
-            // Its children may keep the pipe open.
-            Err(RecvTimeoutError::Timeout) if self.has_ended() => Some(Event::Ended),
+            // Its children may keep the pipe open. What it said last may still be on its way.
+            Err(RecvTimeoutError::Timeout) if self.has_ended() => {
+                Some(self.events.recv_timeout(LAST_MESSAGE).unwrap_or(Event::Ended))
+            }
             Err(RecvTimeoutError::Timeout) => None,
             Err(RecvTimeoutError::Disconnected) => Some(Event::Ended),
         }
