@@ -28,7 +28,6 @@ bundled! {
     "radiance": "radiance.py",
     "povray": "povray.py",
     "threejs": "threejs.mjs",
-    "povray": "povray.py",
 }
 
 /// What workers in Python share.
@@ -66,6 +65,12 @@ mod tests {
             let is_node = bundled.file.ends_with(".mjs");
             assert_eq!(recipe.requires_node.is_some(), is_node, "{}", bundled.name);
         }
+    }
+
+    #[test]
+    fn names_are_unique() {
+        let names: std::collections::BTreeSet<_> = BUNDLED.iter().map(|bundled| bundled.name).collect();
+        assert_eq!(names.len(), BUNDLED.len());
     }
 
     #[test]
