@@ -333,7 +333,8 @@ impl<'a> Place<'a> {
         observe: &dyn Fn(&str),
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), InstallationError> {
-        observe(&format!("installing {} in {}", self.recipe.dependencies.join(" "), self.folder.display()));
+        let (packages, folder) = (self.recipe.dependencies.join(" "), self.folder.display());
+        observe(&format!("installing {} ({packages}) in {folder}", self.recipe.details().title));
         if self.recipe.requires_node.is_some() {
             self.make_node(stop)
         } else {

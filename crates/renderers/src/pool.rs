@@ -32,8 +32,8 @@ pub struct PoolOptions {
     pub start_limit: Duration,
     /// How long a worker may say nothing while it works on a request.
     pub time_limit: Duration,
-    /// A worker whose resident memory has grown beyond this many bytes is replaced between two pictures. Renderers leak:
-    /// the largest that comes with lookmatch needs a fifth of the default, and a machine of 16 GiB can still bear it.
+    /// A worker that holds more than this many bytes of memory, with all that it started, is replaced between two
+    /// pictures: renderers leak. The default is five times what the largest that comes with lookmatch needs.
     pub memory_limit: u64,
     /// A file that the workers' logs are appended to.
     pub log: Option<PathBuf>,
@@ -209,7 +209,7 @@ impl Pool {
                 usage.wall_s += picture.wall_s;
                 let limit = self.options.memory_limit;
                 // A worker that leaks is replaced before it takes the machine down.
-                seat.worker.take_if(|worker| worker.resident().is_some_and(|bytes| bytes > limit));
+                seat.worker.take_if(|worker| worker.outgrows(limit));
             }
             Err(RendererError::Request(_) | RendererError::Start { .. }) => usage.failures += 1,
             Err(_) => (),

@@ -28,6 +28,8 @@ const LAST_WORDS: usize = 40;
 const QUOTED: usize = 3;
 /// Messages that may wait to be looked at; a worker that writes more has to wait.
 const WAITING: usize = 16;
+/// How long what an ended worker wrote may be on its way.
+const LAST_MESSAGE: Duration = Duration::from_millis(200);
 /// The variable that marks the environment of a worker and of all that it starts.
 const MARK: &str = "LOOKMATCH_WORKER";
 
@@ -113,9 +115,9 @@ impl Process {
         })
     }
 
-    /// The process's number.
-    pub(crate) fn id(&self) -> u32 {
-        self.child.id()
+    /// Resident memory in bytes of the worker and all that it started; 0 where the system does not tell.
+    pub(crate) fn resident(&self) -> u64 {
+        marked(&self.mark).filter_map(resident).sum()
     }
 
     /// Sends a line and the bytes after it; up to `most_bytes` may come with the answer. Where the worker is gone, that is
@@ -131,8 +133,10 @@ impl Process {
     pub(crate) fn receive(&self, wait: Duration) -> Option<Event> {
         match self.events.recv_timeout(wait) {
             Ok(event) => Some(event),
-            // Its children may keep the pipe open.
-            Err(RecvTimeoutError::Timeout) if self.has_ended() => Some(Event::Ended),
+            // Its children may keep the pipe open. What it said last may still be on its way.
+            Err(RecvTimeoutError::Timeout) if self.has_ended() => {
+                Some(self.events.recv_timeout(LAST_MESSAGE).unwrap_or(Event::Ended))
+            }
             Err(RecvTimeoutError::Timeout) => None,
             Err(RecvTimeoutError::Disconnected) => Some(Event::Ended),
         }
@@ -218,23 +222,34 @@ fn new_mark() -> String {
     format!("{}-{}-{now}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
-/// Ends what a worker started in groups of their own.
-#[cfg(target_os = "linux")]
-fn kill_marked(mark: &str) {
+/// Numbers of the processes that bear a mark, where the system tells: a worker and all that it started.
+fn marked(mark: &str) -> impl Iterator<Item = i32> {
     let wanted = format!("{MARK}={mark}");
-    for entry in std::fs::read_dir("/proc").into_iter().flatten().flatten() {
-        let Some(id) = entry.file_name().to_str().and_then(|name| name.parse().ok()) else { continue };
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    entries.filter_map(move |entry| {
+        let id = entry.file_name().to_str()?.parse().ok()?;
         // Those of other users cannot be read, and are not ours.
-        let Ok(environment) = std::fs::read(entry.path().join("environ")) else { continue };
-        if environment.split(|byte| *byte == 0).any(|variable| variable == wanted.as_bytes()) {
-            let id = rustix::process::Pid::from_raw(id);
-            id.map(|id| rustix::process::kill_process(id, rustix::process::Signal::KILL).ok());
+        let environment = std::fs::read(entry.path().join("environ")).ok()?;
+        environment.split(|byte| *byte == 0).any(|variable| variable == wanted.as_bytes()).then_some(id)
+    })
+}
+
+/// Ends what a worker started in groups of their own.
+fn kill_marked(mark: &str) {
+    for id in marked(mark) {
+        #[cfg(unix)]
+        if let Some(id) = rustix::process::Pid::from_raw(id) {
+            rustix::process::kill_process(id, rustix::process::Signal::KILL).ok();
         }
     }
 }
 
-#[cfg(not(target_os = "linux"))]
-fn kill_marked(_: &str) {}
+/// Resident memory of a process in bytes.
+fn resident(id: i32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{id}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    Some(1024 * line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
+}
 
 fn write_requests(mut stdin: ChildStdin, outbox: &Receiver<Packet>) {
     while let Ok((line, data)) = outbox.recv() {

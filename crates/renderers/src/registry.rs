@@ -26,8 +26,8 @@ bundled! {
     "cycles": "cycles.py",
     "luxcore": "luxcore.py",
     "radiance": "radiance.py",
-    "threejs": "threejs.mjs",
     "povray": "povray.py",
+    "threejs": "threejs.mjs",
 }
 
 /// What workers in Python share.
@@ -65,6 +65,12 @@ mod tests {
             let is_node = bundled.file.ends_with(".mjs");
             assert_eq!(recipe.requires_node.is_some(), is_node, "{}", bundled.name);
         }
+    }
+
+    #[test]
+    fn names_are_unique() {
+        let names: std::collections::BTreeSet<_> = BUNDLED.iter().map(|bundled| bundled.name).collect();
+        assert_eq!(names.len(), BUNDLED.len());
     }
 
     #[test]

@@ -20,6 +20,9 @@ const GLANCE: Duration = Duration::from_millis(50);
 /// How long a worker may take to end by itself.
 const GRACE: Duration = Duration::from_millis(500);
 
+/// How often its memory is looked at.
+const WEIGHING: Duration = Duration::from_secs(1);
+
 /// A picture by a renderer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
@@ -64,6 +67,8 @@ pub(crate) struct Worker {
     /// Revisions of the scenes that it holds.
     scenes: BTreeMap<String, u64>,
     material: Option<(String, Map<String, Value>)>,
+    /// When its memory was last looked at.
+    weighed: Option<Instant>,
 }
 
 impl Worker {
@@ -87,6 +92,7 @@ impl Worker {
             time_limit: options.start_limit,
             scenes: BTreeMap::new(),
             material: None,
+            weighed: None,
         };
         let body = json!({ "request": HELLO, "protocol": PROTOCOL });
         let answer = worker.ask(&body, None, 0, stop).and_then(|(answer, _)| Ok(Hello::read(answer)?));
@@ -198,11 +204,13 @@ impl Worker {
         Box::new(Failure { renderer: self.label.clone(), request: request.into(), cause, last_words }).into()
     }
 
-    /// Resident memory in bytes, where the system tells.
-    pub(crate) fn resident(&self) -> Option<u64> {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).ok()?;
-        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-        Some(1024 * line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
+    /// True where it holds more memory than a limit, in bytes. Looking takes milliseconds: not after every picture.
+    pub(crate) fn outgrows(&mut self, limit: u64) -> bool {
+        if self.weighed.is_some_and(|then| then.elapsed() < WEIGHING) {
+            return false;
+        }
+        self.weighed = Some(Instant::now());
+        self.process.resident() > limit
     }
 
     /// Asks it to end, without waiting for that.

@@ -2,12 +2,19 @@
 
 #![cfg(target_os = "linux")]
 
+use std::f64::consts::{PI, TAU};
 use std::fs;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use lookmatch_renderers::{BUNDLED, Bundled, InstallationError, Installations, Pool, PoolOptions, State};
+use glam::DVec3;
+use lookmatch_imaging::Image;
+use lookmatch_renderers::{
+    BUNDLED, Bundled, InstallationError, Installations, Job, Light, Pool, PoolOptions, State,
+};
+use lookmatch_rendering::{EnvironmentLight, Illumination, Scene};
 
 /// A renderer that installs nothing but an environment, and ends at once with its variables as last words.
 fn bundled(requires: &str, dependencies: &str) -> Bundled {
@@ -101,7 +108,58 @@ fn what_cannot_be_had_is_said() {
     assert!(message.to_string().starts_with("cannot create folder '"), "{message}");
 }
 
-/// Installs what RENDERER names, or everything, in the user's folder, and asks each what it is. Downloads a lot.
+/// A smooth map whose channels tell east from west, front from back, and up from down.
+fn sky(u: f64, v: f64) -> [f64; 3] {
+    let (sin, cos) = (TAU * u).sin_cos();
+    [1.0 + 0.5 * sin, 1.0 + 0.5 * cos, 1.0 + 0.5 * (PI * v).cos()]
+}
+
+/// A ball under that map, twice as bright and turned by a quarter: what was at the left edge is at +X.
+fn ball(folder: &Path) -> Scene {
+    let (map, width, height) = (folder.join("sky.exr"), 256, 128);
+    let texel = |x: usize, y: usize| {
+        let at = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
+        sky(at(x, width), at(y, height)).map(|v| v as f32)
+    };
+    lookmatch_imaging::write(&map, &Image::from_fn(width, height, texel), &[]).unwrap();
+    let light = EnvironmentLight { map: map.to_str().unwrap().into(), scale: 2.0, rotation: 90.0 };
+    Scene { plane: None, environment: Some(light), ..Scene::reference() }
+}
+
+/// What is seen of the map past the ball, at the middle of a pixel.
+fn background(scene: &Scene, size: usize, x: usize, y: usize) -> [f64; 3] {
+    let camera = &scene.camera;
+    let [eye, target, up] = [camera.eye, camera.target, camera.up].map(DVec3::from);
+    let forward = (target - eye).normalize();
+    let right = forward.cross(up).normalize();
+    let film =
+        |k: usize| ((2 * k + 1) as f64 / size as f64 - 1.0) * (camera.vertical_fov.to_radians() / 2.0).tan();
+    let ray = (forward + right * film(x) - right.cross(forward) * film(y)).normalize();
+    sky(ray.x.atan2(-ray.z) / TAU - 0.25, ray.y.acos() / PI).map(|v| 2.0 * v)
+}
+
+/// Renders on an installed renderer, and compares what is seen past the ball with the map.
+fn check_background(pool: &Pool, name: &str) {
+    if !pool.hello().capabilities.lights.contains(&Light::Environment) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, size) = (ball(folder.path()), 32);
+    pool.scene("ball", &scene, Illumination::Environment, size).unwrap();
+    let check = &pool.hello().check.lambert;
+    let mut values = check.values.clone();
+    values.insert(check.parameter.clone(), serde_json::json!([0.5, 0.5, 0.5]));
+    let job = Job { scene: "ball".into(), model: check.model.clone(), values, samples: 16, seed: 1 };
+    let picture = pool.render(&[job]).remove(0).unwrap();
+    for (x, y) in [(0, 0), (size - 1, 0), (0, size - 1), (size - 1, size - 1), (size / 2, 0)] {
+        let (found, expected) = (picture.image.get(x, y), background(&scene, size, x, y));
+        let is_close = (0..3).all(|c| (f64::from(found[c]) / expected[c] - 1.0).abs() < 0.02);
+        assert!(is_close, "{name}: {found:?} at {x}, {y}; expected {expected:?}");
+    }
+    eprintln!("{name}: {:?}", pool.usage());
+}
+
+/// Installs what RENDERER names, or everything, in the user's folder, and lets each render a picture. Downloads a lot.
 #[test]
 #[ignore = "downloads renderers"]
 fn renderers_install_and_start() {
@@ -119,5 +177,23 @@ fn renderers_install_and_start() {
             pool.hello().version,
             pool.hello().model_names().collect::<Vec<_>>()
         );
+        check_background(&pool, renderer.name);
     }
+}
+
+/// Libraries that the system lacks are unpacked for who cannot install them. Downloads one.
+#[test]
+#[ignore = "downloads a package; does nothing for an administrator"]
+fn libraries_are_unpacked() {
+    let text = bundled(">=3.8", "[]").text.replace("# pip", "# debian = [\"libmikmod3\"]\n# pip");
+    let fake = Bundled { name: "fake", file: "fake.py", text: text.leak() };
+    let folder = tempfile::tempdir().unwrap();
+    let installations = Installations::within(folder.path());
+    installations.install(&fake, &|text| eprintln!("{text}"), &never).unwrap();
+    assert!(matches!(installations.state(&fake).unwrap(), State::Installed { .. }));
+    let launch = installations.launch(&fake).unwrap();
+    let (_, paths) = launch.env.iter().find(|(name, _)| name == "LD_LIBRARY_PATH").unwrap();
+    let libraries =
+        std::env::split_paths(paths).flat_map(|folder| fs::read_dir(folder).into_iter().flatten());
+    assert!(libraries.flatten().any(|file| file.file_name().to_string_lossy().starts_with("libmikmod")));
 }

@@ -36,7 +36,7 @@ fn options() -> PoolOptions {
     PoolOptions {
         workers: Some(1),
         start_limit: Duration::from_secs(20),
-        time_limit: Duration::from_secs(1),
+        time_limit: Duration::from_secs(2),
         ..PoolOptions::default()
     }
 }
@@ -98,6 +98,16 @@ fn group(id: u32) -> Vec<u32> {
         (fields[0] != "Z" && fields[2] == id.to_string()).then_some(process)
     });
     members.collect()
+}
+
+/// Waits until all processes of some groups are gone.
+fn wait_for_end(workers: &[String], most: Duration) {
+    let alive = || workers.iter().flat_map(|id| group(id.parse().unwrap())).collect::<Vec<_>>();
+    let end = Instant::now() + most;
+    while !alive().is_empty() {
+        assert!(Instant::now() < end, "left: {:?}", alive());
+        thread::sleep(Duration::from_millis(20));
+    }
 }
 
 fn job(values: Value) -> Job {
@@ -176,7 +186,7 @@ fn crashes() {
 
 #[test]
 fn hanging() {
-    fails_alone("hang", &["said nothing for 1 s", "its last words: thinking"]).close();
+    fails_alone("hang", &["said nothing for 2 s", "its last words: thinking"]).close();
 }
 
 #[test]
@@ -291,6 +301,19 @@ fn workers_that_do_not_end_are_killed() {
 }
 
 #[test]
+fn workers_that_do_not_read_are_killed() {
+    let folder = tempfile::tempdir().unwrap();
+    let pool = Pool::start(launch("deaf", folder.path()), options(), never()).unwrap();
+    // The map is larger than any pipe.
+    let scene = pool.scene("sky", &Scene::reference(), Illumination::Environment, 8);
+    let message = scene.unwrap_err().to_string();
+    assert!(message.contains("scene 'sky': the worker said nothing for 2 s"), "{message}");
+    for id in notes(folder.path(), "start") {
+        assert_eq!(group(id.parse().unwrap()), [0; 0]);
+    }
+}
+
+#[test]
 fn nothing_is_left_after_a_panic() {
     let folder = tempfile::tempdir().unwrap();
     let launch = launch("fine", folder.path());
@@ -358,8 +381,7 @@ fn renderers_that_do_not_start_say_why() {
 
 #[test]
 fn a_slow_start_is_waited_for() {
-    let studio =
-        Studio::new("slow-start", PoolOptions { time_limit: Duration::from_millis(500), ..options() });
+    let studio = Studio::new("slow-start", options());
     studio.one(json!({})).unwrap();
     studio.close();
 }
@@ -432,16 +454,11 @@ fn killed_tool_leaves_nothing(worker: &[&str]) {
         assert!(Instant::now() < end, "the tool does not render");
         thread::sleep(Duration::from_millis(20));
     }
-    let workers: Vec<u32> = notes(folder.path(), "start").iter().map(|id| id.parse().unwrap()).collect();
-    let alive = || workers.iter().flat_map(|id| group(*id)).collect::<Vec<_>>();
-    assert!(!alive().is_empty());
+    let workers = notes(folder.path(), "start");
+    assert!(!group(workers[0].parse().unwrap()).is_empty());
     tool.kill().unwrap();
     tool.wait().unwrap();
-    let end = Instant::now() + Duration::from_secs(3);
-    while !alive().is_empty() {
-        assert!(Instant::now() < end, "left: {:?}", alive());
-        thread::sleep(Duration::from_millis(20));
-    }
+    wait_for_end(&workers, Duration::from_secs(3));
 }
 
 #[test]

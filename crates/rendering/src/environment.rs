@@ -304,7 +304,8 @@ mod tests {
         // A quarter of a turn is two columns: what was at the left edge, −Z, is at +X.
         assert_eq!(first_row(&image(90.0, 8)), [12.0, 14.0, 0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
         assert_eq!(first_row(&image(-22.5, 8))[..3], [1.0, 3.0, 5.0]);
-        assert_eq!(first_row(&image(0.0, 4)), [1.0, 5.0, 9.0, 13.0]);
+        let halved = first_row(&image(0.0, 4));
+        assert!(halved.iter().zip([1.0, 5.0, 9.0, 13.0]).all(|(a, b)| (a - b).abs() < 1e-5), "{halved:?}");
         assert_eq!(image(0.0, 8).get(3, 1), [6.0, 0.0, 0.0]);
     }
 

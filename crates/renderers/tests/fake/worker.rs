@@ -46,10 +46,10 @@ fn worker(start: &str) {
         }
         "dies-later" if fs::exists(folder().join("stop-starting")).unwrap() => exit(8),
         "hangs-at-start" => sleep(Duration::from_secs(3600)),
-        "slow-start" => sleep(Duration::from_millis(700)),
+        "slow-start" => sleep(Duration::from_millis(2500)),
         _ => (),
     }
-    let requests = read_requests(start == "ignores-shutdown");
+    let requests = read_requests(start);
     let (mut size, mut material) = (0, Value::Null);
     for request in requests {
         let id = request["id"].clone();
@@ -79,7 +79,8 @@ fn worker(start: &str) {
 }
 
 /// Requests as they come; the end of the input ends the process in the middle of a render.
-fn read_requests(ignores_end: bool) -> Receiver<Value> {
+fn read_requests(start: &str) -> Receiver<Value> {
+    let (ignores_end, is_deaf) = (start == "ignores-shutdown", start == "deaf");
     let (sender, requests) = channel();
     thread::spawn(move || {
         let mut stdin = io::stdin().lock();
@@ -90,8 +91,11 @@ fn read_requests(ignores_end: bool) -> Receiver<Value> {
             io::copy(&mut stdin.by_ref().take(bytes), &mut io::sink()).unwrap();
             sender.send(request).unwrap();
             line.clear();
+            if is_deaf {
+                break;
+            }
         }
-        if !ignores_end {
+        if !ignores_end && !is_deaf {
             exit(0);
         }
         sleep(Duration::from_secs(3600));
@@ -114,7 +118,7 @@ fn hello(start: &str, id: &Value) -> Value {
         "version": "1.0", "licence": "MIT",
         "models": [{"name": "fake"}],
         "capabilities": {"deterministic": "exact", "seeds": false, "noise": false, "samples": "nothing",
-            "lights": ["point"], "threads": "all", "cancel": false, "interreflection": false},
+            "lights": if start == "deaf" { json!(["environment"]) } else { json!(["point"]) }, "threads": "all", "cancel": false, "interreflection": false},
         "check": {"lambert": {"model": "fake", "values": {}, "parameter": "colour"}, "mirror": null},
         "approximations": ["it does not render"],
     })
@@ -177,9 +181,9 @@ fn render(id: &Value, size: u64, material: &Value) {
             picture(size, level);
         }
         "progress" => {
-            for k in 0..8 {
-                sleep(Duration::from_millis(250));
-                say(&json!({"id": id, "progress": f64::from(k) / 8.0}), &[]);
+            for k in 0..10 {
+                sleep(Duration::from_millis(300));
+                say(&json!({"id": id, "progress": f64::from(k) / 10.0}), &[]);
             }
             picture(size, level);
         }
