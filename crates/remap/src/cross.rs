@@ -19,6 +19,7 @@ use rayon::prelude::*;
 use crate::carry::{Body, SourceLook};
 use crate::gallery::{Key, Stopped, key};
 use crate::probe::Noise;
+use crate::settle::Bowl;
 use crate::stage::LIGHTS;
 use crate::strategy::{Counting, Matched, searched};
 use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
@@ -28,10 +29,6 @@ use crate::{Entry, Plan, RemapError, Stage};
 const SCENES: [&str; 2] = ["reference-point", "reference-environment"];
 /// Fitness of a candidate that could not be rendered: worse than any picture can be.
 const FAILED: f64 = 1e9;
-/// Candidates that are refined when noise does not tell them apart.
-const CONTENDERS: usize = 6;
-/// Standard errors by which one candidate must be better than another.
-const CLEAR: f64 = 2.0;
 /// Memory for looks, in bytes.
 const CAPACITY: usize = 500 << 20;
 /// Share of a body's brightness that its measurement may be off by.
@@ -382,46 +379,35 @@ impl CrossMatch<'_> {
         Ok(looks.into_iter().map(score).collect())
     }
 
-    /// Renders the best points and their neighbours with more and more samples, until one of them is clearly the best or the
-    /// budget ends; says which it was.
-    fn settled(&mut self, found: &Point, problem: &Problem, most: u32) -> Result<(Point, bool), RemapError> {
+    /// Renders candidates around the best with more and more samples, until it is known which is the best or the budget ends;
+    /// says which it was.
+    fn settled(&mut self, found: Point, problem: &Problem, most: u32) -> Result<(Point, bool), RemapError> {
         let mut samples = self.stage.sampling.samples;
-        let mut points: Vec<Point> = self.scores.keys().cloned().collect();
-        for neighbour in neighbours(found, problem) {
-            if !points.contains(&neighbour) {
-                points.push(neighbour);
-            }
-        }
-        // Two thirds of all points are far off: no number of samples would bring them back.
-        points.sort_by(|a, b| self.known(a).total_cmp(&self.known(b)).then_with(|| a.cmp(b)));
-        points.truncate(4 * CONTENDERS);
-        loop {
+        let mut centre = found;
+        for round in 0.. {
             if (self.stop)() {
                 return Err(stopped());
             }
+            let bowl = Bowl::around(self.lattice, &centre, &problem.bounds, round);
+            let points = bowl.candidates(self.scores.keys());
             let scores = self.scored(&points, samples)?;
-            let mut ranked: Vec<(Score, Point)> = scores.into_iter().zip(points).collect();
-            ranked.sort_by(|a, b| a.0.value.total_cmp(&b.0.value).then_with(|| a.1.cmp(&b.1)));
-            ranked.iter().for_each(|(score, point)| {
-                self.scores.insert(point.clone(), score.value);
-            });
-            let best = ranked[0].0;
-            let is_open = |other: &Score| {
-                other.value - best.value <= CLEAR * (best.error.powi(2) + other.error.powi(2)).sqrt()
-            };
-            let open = ranked.iter().take_while(|(score, _)| is_open(score)).count().clamp(1, CONTENDERS);
-            ranked.truncate(open);
-            points = ranked.into_iter().map(|(_, point)| point).collect();
-            if open == 1 || samples >= most || best.error == 0.0 {
-                return Ok((points.swap_remove(0), open == 1 || best.error == 0.0));
+            if scores.iter().all(|score| score.error == 0.0 || score.value >= FAILED) {
+                break;
+            }
+            let scored: Vec<(Point, Score)> =
+                points.into_iter().zip(scores).filter(|(_, score)| score.value < FAILED).collect();
+            self.scores.extend(scored.iter().map(|(point, score)| (point.clone(), score.value)));
+            // A fitness is a distance; its square is what has the shape of a bowl.
+            let squares = |(point, Score { value, .. }): (Point, Score)| (point, value * value.abs());
+            let bottom = bowl.bottom(&scored.into_iter().map(squares).collect::<Vec<_>>());
+            centre = bottom.point;
+            if bottom.is_known || samples >= most {
+                return Ok((centre, bottom.is_known));
             }
             samples = (4 * samples).min(most);
         }
-    }
-
-    fn known(&self, point: &Point) -> f64 {
-        // Neighbours that were not seen yet come first.
-        self.scores.get(point).copied().unwrap_or(f64::NEG_INFINITY)
+        // Without noise the best that was seen is the best.
+        Ok((centre, true))
     }
 }
 
@@ -440,22 +426,6 @@ impl Counting for CrossMatch<'_> {
     fn compared(&self) -> usize {
         self.scores.len()
     }
-}
-
-/// Points one step away along one axis, within bounds.
-fn neighbours(point: &Point, problem: &Problem) -> Vec<Point> {
-    let mut found = vec![point.clone()];
-    for axis in (0..point.len()).filter(|axis| problem.lattice.axes[*axis].len() > 2) {
-        for index in [point[axis].checked_sub(1), Some(point[axis] + 1)].into_iter().flatten() {
-            let mut neighbour = point.clone();
-            neighbour[axis] = index;
-            let neighbour = problem.bounds.clamp(&neighbour);
-            if !found.contains(&neighbour) {
-                found.push(neighbour);
-            }
-        }
-    }
-    found
 }
 
 fn stopped() -> RemapError {
@@ -489,7 +459,8 @@ impl CrossStage {
     ) -> Result<Matched, RemapError> {
         let Sampling { samples, most } = self.sampling;
         let source = plan.source_material(values)?;
-        let seen = self.look(&source, true, samples)?;
+        // It takes part in every comparison, and is rendered but once.
+        let seen = self.look(&source, true, most)?;
         let level = seen.level();
         let rounded = self.carried(&source, level)?.rounded_albedo();
         let mut objective = CrossMatch {
@@ -508,7 +479,7 @@ impl CrossStage {
                 reasons.last().unwrap_or_else(|| "no target could be rendered".into()),
             ));
         }
-        let (best, is_decided) = objective.settled(&found.best, problem, most)?;
+        let (best, is_decided) = objective.settled(found.best, problem, most)?;
         let compared = objective.scores.len();
         let target_values = problem.lattice.values(&best);
         let (target, body) = self.with_body(plan, &source, &target_values, level)?;

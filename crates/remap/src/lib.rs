@@ -17,6 +17,7 @@ mod pairs;
 mod plan;
 mod probe;
 mod projection;
+mod settle;
 mod stage;
 mod strategy;
 mod studio;

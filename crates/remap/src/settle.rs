@@ -1,0 +1,206 @@
+//! Where a noisy search ends: at the bottom of a bowl that is fitted to many candidates.
+//!
+//! One candidate's score says little where noise is larger than what a step of the lattice changes. But the scores near
+//! the best form a bowl, and all of them together tell where its bottom is: a quadratic in the parameters, fitted by least squares
+//! (the response surface of Box and Wilson 1951). Its own standard error says whether more samples are needed.
+
+use lookmatch_search::{Bounds, Lattice, Point};
+use nalgebra::{DMatrix, DVector};
+
+/// Levels to each side of the best that belong to the bowl at first, and in the end.
+const REACH: [u32; 2] = [12, 6];
+/// Candidates per coefficient of the fit.
+const CANDIDATES: usize = 4;
+/// The bottom is known when its standard error is less than this many levels.
+const KNOWN: f64 = 0.3;
+/// Lattice points of a bowl that are looked at one by one; of larger ones, only its candidates.
+const LOOKED_AT: u64 = 20_000;
+
+/// The part of the lattice around a point.
+pub(crate) struct Bowl<'a> {
+    lattice: &'a Lattice,
+    centre: Point,
+    bounds: Bounds,
+    /// Axes along which it has a shape: not those of switches.
+    axes: Vec<usize>,
+}
+
+/// The bottom of a bowl.
+pub(crate) struct Bottom {
+    pub(crate) point: Point,
+    pub(crate) is_known: bool,
+}
+
+impl<'a> Bowl<'a> {
+    /// The bowl around a point, within bounds, in the given round of narrowing.
+    pub(crate) fn around(lattice: &'a Lattice, centre: &Point, within: &Bounds, round: u32) -> Self {
+        let reach = (REACH[0] >> round).max(REACH[1]);
+        let is_free = |axis: &usize| lattice.axes[*axis].len() > 2 && within.low[*axis] < within.high[*axis];
+        let axes: Vec<usize> = (0..centre.len()).filter(is_free).collect();
+        let mut bounds = Bounds { low: centre.clone(), high: centre.clone() };
+        for axis in &axes {
+            bounds.low[*axis] = within.low[*axis].max(centre[*axis].saturating_sub(reach));
+            bounds.high[*axis] = within.high[*axis].min(centre[*axis] + reach);
+        }
+        Self { lattice, centre: centre.clone(), bounds, axes }
+    }
+
+    /// The candidates to look at: known points of the bowl, those nearest to its middle, and as many new ones as a fit lacks.
+    pub(crate) fn candidates<'p>(&self, known: impl Iterator<Item = &'p Point>) -> Vec<Point> {
+        let wanted = CANDIDATES * self.coefficients();
+        let mut points: Vec<Point> = known.filter(|point| self.contains(point)).cloned().collect();
+        points.sort_by_key(|point| (self.distance(point), point.clone()));
+        points.truncate(wanted);
+        if !points.contains(&self.centre) {
+            points.push(self.centre.clone());
+        }
+        // A Kronecker sequence fills the bowl evenly, whatever its dimension.
+        for k in 1..8 * wanted as u32 {
+            if points.len() >= wanted {
+                break;
+            }
+            let point = self.spread(k);
+            if !points.contains(&point) {
+                points.push(point);
+            }
+        }
+        points
+    }
+
+    /// Where a quadratic through the scores of candidates is least.
+    pub(crate) fn bottom(&self, candidates: &[(Point, f64)]) -> Bottom {
+        let rows: Vec<Vec<f64>> = candidates.iter().map(|(point, _)| self.terms(point)).collect();
+        let design = DMatrix::from_fn(rows.len(), self.coefficients(), |r, c| rows[r][c]);
+        let scores = DVector::from_iterator(candidates.len(), candidates.iter().map(|(_, score)| *score));
+        let best = || {
+            let least = candidates.iter().min_by(|a, b| a.1.total_cmp(&b.1).then_with(|| a.0.cmp(&b.0)));
+            least.map_or_else(|| self.centre.clone(), |(point, _)| point.clone())
+        };
+        let freedom = candidates.len().saturating_sub(self.coefficients());
+        let inverse = (design.transpose() * &design).try_inverse().filter(|_| freedom > 0);
+        let Some(inverse) = inverse else { return Bottom { point: best(), is_known: false } };
+        let fit = &inverse * design.transpose() * &scores;
+        let residual = (&scores - &design * &fit).norm_squared() / freedom as f64;
+        let value = |point: &Point| self.terms(point).iter().zip(fit.iter()).map(|(t, c)| t * c).sum::<f64>();
+        let least = self.points(candidates).into_iter().min_by(|a, b| {
+            let order = value(a).total_cmp(&value(b));
+            order.then_with(|| a.cmp(b))
+        });
+        // The bottom of a x² + b x lies at −b/2a, and is as uncertain as b.
+        let error = |k: usize| {
+            let (slope, curve) = (1 + k, 1 + self.axes.len() + k);
+            let error = (residual * inverse[(slope, slope)]).sqrt();
+            if fit[curve] > 0.0 {
+                self.reach(self.axes[k]) * error / (2.0 * fit[curve])
+            } else {
+                f64::INFINITY
+            }
+        };
+        let is_known = (0..self.axes.len()).all(|k| error(k) < KNOWN);
+        Bottom { point: least.unwrap_or_else(best), is_known }
+    }
+
+    /// 1, x, x², and products.
+    fn terms(&self, point: &Point) -> Vec<f64> {
+        let x: Vec<f64> = self
+            .axes
+            .iter()
+            .map(|axis| (f64::from(point[*axis]) - f64::from(self.centre[*axis])) / self.reach(*axis))
+            .collect();
+        let mut terms = vec![1.0];
+        terms.extend(&x);
+        terms.extend(x.iter().map(|x| x * x));
+        terms.extend((0..x.len()).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| x[i] * x[j]));
+        terms
+    }
+
+    fn coefficients(&self) -> usize {
+        let axes = self.axes.len();
+        1 + 2 * axes + axes * axes.saturating_sub(1) / 2
+    }
+
+    fn reach(&self, axis: usize) -> f64 {
+        let (low, high) = (self.bounds.low[axis], self.bounds.high[axis]);
+        f64::from((high - self.centre[axis]).max(self.centre[axis] - low)).max(1.0)
+    }
+
+    fn contains(&self, point: &Point) -> bool {
+        (0..point.len()).all(|axis| (self.bounds.low[axis]..=self.bounds.high[axis]).contains(&point[axis]))
+    }
+
+    fn distance(&self, point: &Point) -> u32 {
+        point.iter().zip(&self.centre).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
+    }
+
+    /// The `k`-th of points that fill the bowl evenly (Roberts 2018: powers of the root of x^(d+1) = x + 1).
+    fn spread(&self, k: u32) -> Point {
+        let dimensions = self.axes.len();
+        let mut root = 2.0f64;
+        (0..30).for_each(|_| root = (1.0 + root).powf(1.0 / (dimensions as f64 + 1.0)));
+        let mut point = self.centre.clone();
+        for (place, axis) in self.axes.iter().enumerate() {
+            let share = (0.5 + f64::from(k) * root.powi(-(place as i32 + 1))).fract();
+            let (low, high) = (self.bounds.low[*axis], self.bounds.high[*axis]);
+            point[*axis] = low + (share * f64::from(high - low + 1)) as u32;
+        }
+        point
+    }
+
+    fn points(&self, candidates: &[(Point, f64)]) -> Vec<Point> {
+        let count = |axis: &usize| u64::from(self.bounds.high[*axis] - self.bounds.low[*axis] + 1);
+        if self.axes.iter().map(count).product::<u64>() > LOOKED_AT {
+            return candidates.iter().map(|(point, _)| point.clone()).collect();
+        }
+        self.lattice.points(&self.bounds).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookmatch_search::Axis;
+
+    fn lattice() -> Lattice {
+        let axis = |name: &str, max| Axis::regular(name, 0.0, max, 1.0).unwrap();
+        Lattice { axes: vec![axis("switch", 1.0), axis("a", 60.0), axis("b", 60.0)] }
+    }
+
+    /// A tilted bowl with noise, a hundred times what a step changes at its bottom.
+    fn score(point: &Point, noise: f64) -> f64 {
+        let [a, b] = [f64::from(point[1]) - 31.0, f64::from(point[2]) - 22.0];
+        let random = (point[1] * 7919 + point[2] * 104_729 + 13) % 1009;
+        0.01 * (a * a + a * b + 2.0 * b * b) + noise * (f64::from(random) / 1009.0 - 0.5)
+    }
+
+    fn found(noise: f64) -> Bottom {
+        let lattice = lattice();
+        let whole = Bounds::full(&lattice);
+        let bowl = Bowl::around(&lattice, &vec![1, 27, 26], &whole, 0);
+        let candidates = bowl.candidates(std::iter::empty());
+        assert_eq!(candidates.len(), 24);
+        assert!(candidates.iter().all(|p| p[0] == 1 && p[1].abs_diff(27) <= 12 && p[2].abs_diff(26) <= 12));
+        let scored: Vec<(Point, f64)> =
+            candidates.into_iter().map(|p| (p.clone(), score(&p, noise))).collect();
+        bowl.bottom(&scored)
+    }
+
+    #[test]
+    fn the_bottom_is_found_through_noise() {
+        let clean = found(0.0);
+        assert_eq!((clean.point, clean.is_known), (vec![1, 31, 22], true));
+        let noisy = found(1.0);
+        let off = noisy.point.iter().zip([1, 31, 22]).map(|(a, b)| a.abs_diff(b)).max().unwrap();
+        assert!(off <= 2 && !noisy.is_known, "{:?}", noisy.point);
+        assert!(!found(100.0).is_known);
+    }
+
+    #[test]
+    fn known_points_are_looked_at_first() {
+        let lattice = lattice();
+        let bowl = Bowl::around(&lattice, &vec![1, 5, 5], &Bounds::full(&lattice), 1);
+        let known = [vec![1, 6, 6], vec![0, 5, 5], vec![1, 40, 5]];
+        let candidates = bowl.candidates(known.iter());
+        assert_eq!(candidates[0], known[0], "the others are not in the bowl");
+        assert!(candidates[1..].iter().all(|p| !known.contains(p)));
+    }
+}
