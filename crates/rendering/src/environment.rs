@@ -64,6 +64,11 @@ impl EnvironmentMap {
 
     /// The map of a light from its [`EnvironmentMap::content`].
     pub(crate) fn decode(light: &EnvironmentLight, content: &[u8]) -> Result<Self, SceneError> {
+        Ok(Self::new(&Self::image(light, content)?, light.scale, light.rotation))
+    }
+
+    /// The image of a light as it is stored: neither scaled nor turned.
+    pub(crate) fn image(light: &EnvironmentLight, content: &[u8]) -> Result<Image, SceneError> {
         let image = match light.map.as_str() {
             "designed" => designed_map(),
             "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), content)?,
@@ -73,7 +78,7 @@ impl EnvironmentMap {
             let (width, height) = (image.width(), image.height());
             return Err(SceneError::Aspect { map: light.map.clone(), width, height });
         }
-        Ok(Self::new(&image, light.scale, light.rotation))
+        Ok(image)
     }
 
     /// Prepares a 2:1 image. Negative values, which compression leaves in some published maps, count as 0.
