@@ -70,8 +70,8 @@ fn finding(finding: &Finding) -> String {
     let Finding { rule, parameter, value, why, fixes, .. } = finding;
     let mut text = format!("{parameter} = {value}: {certainty} ({rule})\n  {why}\n");
     for (k, fix) in fixes.iter().enumerate() {
-        let lead = if k == 0 { "fix" } else { "or " };
-        text += &format!("  {lead}: {} ({})\n", assignments(fix), fix.says);
+        let lead = if k == 0 { "fix:" } else { "or:" };
+        text += &format!("  {lead:<4} {} ({})\n", assignments(fix), fix.says);
     }
     text
 }
@@ -84,24 +84,20 @@ fn assignments(reading: &Reading) -> String {
 fn explained(explanation: &Explanation) -> String {
     let measures = |t: &Tried| format!("NRMSD {}, fitness {}", score(t.nrmsd), score(t.fitness));
     let mut text = match &explanation.given {
-        Some(given) => format!("as given: {}\n", measures(given)),
-        None => "as given it cannot be rendered\n".to_owned(),
+        Some(given) => format!("as given, the difference is {}\n", measures(given)),
+        None => "as given, it cannot be rendered\n".to_owned(),
     };
     if explanation.is_alike {
         return text + "it looks like the reference\n";
     }
-    if explanation.explanations.is_empty() {
+    let Some(best) = explanation.explanations.first() else {
         return text
-            + &format!(
-                "none of {} other readings of its numbers explains the difference\n",
-                explanation.tried
-            );
-    }
-    for (k, tried) in explanation.explanations.iter().enumerate() {
-        let lead = if k == 0 { "explained by" } else { "or" };
-        let reading = |r: &Reading| format!("{}, if the number is {}", assignments(r), r.says);
+            + &format!("none of {} other readings of its numbers explains that\n", explanation.tried);
+    };
+    for tried in &explanation.explanations {
+        let reading = |r: &Reading| format!("{} ({})", assignments(r), r.says);
         let readings: Vec<String> = tried.readings.iter().map(reading).collect();
-        text += &format!("{lead} {}: {}\n", readings.join(" and "), measures(tried));
+        text += &format!("  with {}: {}\n", readings.join(" and "), measures(tried));
     }
-    text + &format!("suggested: {}\n", explanation.explanations[0].material)
+    text + &format!("suggested by the pictures: {}\n", best.material)
 }

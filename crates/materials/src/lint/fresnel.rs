@@ -9,6 +9,8 @@ use crate::{Preset, Role, metals, physically_based};
 const SAME_COLOUR: f64 = 0.035;
 /// Ratio of indices of a metal by two measurements.
 const SAME_INDEX: f64 = 1.35;
+/// No metal has an index so many times its extinction; semiconductors have.
+const LESS_THAN_METALLIC: f64 = 2.5;
 /// The darkest metal reflects more.
 const DARK_METAL: f64 = 0.15;
 
@@ -81,12 +83,15 @@ pub(super) fn swapped(given: &Given) -> Vec<Suspicion> {
     let (Some(n), Some(extinction)) = (eta.colour(), k.colour()) else { return Vec::new() };
     let [straight, crossed] = [nearest(n, extinction), nearest(extinction, n)];
     let (name, ratio) = crossed;
-    if ratio > SAME_INDEX || straight.1 <= ratio {
+    let (certainty, why) = if ratio <= SAME_INDEX && ratio < straight.1 {
+        (Certainty::Likely, format!("with eta and k swapped these are the index of {name}"))
+    } else if (0..3).all(|c| n[c] > LESS_THAN_METALLIC * extinction[c]) {
+        (Certainty::Possible, "metals have a k that is larger than eta or nearly so".to_owned())
+    } else {
         return Vec::new();
-    }
-    let why = format!("with eta and k swapped these are the index of {name}");
+    };
     let fixes: Vec<Reading> = swapped_index(given).into_iter().collect();
-    vec![Suspicion::of(eta, Certainty::Likely, why, fixes)]
+    vec![Suspicion::of(eta, certainty, why, fixes)]
 }
 
 /// The metal of the most similar index, and the mean ratio to it.

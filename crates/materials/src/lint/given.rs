@@ -68,8 +68,13 @@ impl Given {
         for (name, text) in preset.into_iter().flat_map(|p| &p.values) {
             items.push(Item { is_preset: true, ..Item::read(&mut material, name, text)? });
         }
+        let mut named: Vec<usize> = Vec::new();
         for (name, text) in values {
             let replaced = model.resolve(name)?;
+            if replaced.iter().any(|index| named.contains(index)) {
+                return Err(MaterialError::Repeated { model: model.name.into(), name: name.clone() });
+            }
+            named.extend(&replaced);
             items.retain(|item: &Item| {
                 !(item.is_preset && model.resolve(&item.name).is_ok_and(|i| i == replaced))
             });
@@ -129,11 +134,11 @@ impl Item {
         if let Some((numbers, is_percent)) = unusual.filter(|(v, _)| counts(parameter, v.len())) {
             return Ok(Self { numbers, is_percent, fits: false, ..blank });
         }
+        let numbers: Vec<f64> = text.split('/').filter_map(|part| part.trim().parse().ok()).collect();
         let fits = match material.set(name, text) {
-            Err(MaterialError::OutOfRange { .. }) => false,
+            Err(MaterialError::OutOfRange { .. }) if numbers.iter().all(|v| v.is_finite()) => false,
             other => other.map(|()| true)?,
         };
-        let numbers = text.split('/').filter_map(|part| part.trim().parse().ok()).collect();
         Ok(Self { numbers, fits, ..blank })
     }
 

@@ -192,6 +192,7 @@ mod tests {
             "index-swapped",
             "0.105/0.492/1.477",
         );
+        assert_fix("ggx-conductor:eta=3.5,k=0.2", "index-swapped", "0.2");
         assert!(found("ggx-conductor:eta=0.105/0.492/1.477,k=3.519/2.33/1.81").is_empty());
         // Gold, encoded for a display.
         assert_fix("gltf:metallic=1,base_color=1/0.871/0.639", "metal-colour-encoded", "1/0.7312/0.366");
@@ -268,6 +269,8 @@ mod tests {
             "lambert:diffuse=1/2",
             "{",
             "ward:roughness",
+            "ward:roughness=nan",
+            "ward:roughness=0.1,roughness_u=0.2",
         ] {
             assert!(Given::parse(text).is_err(), "{text}");
         }

@@ -13,7 +13,7 @@ const SCRIPT: &str = include_str!("mitsuba_render.py");
 
 pub(super) fn notes(exported: &Exported) -> String {
     format!(
-        "With `pip install mitsuba` (3.5 or newer), `python render.py` renders all four pictures; `python render.py 1024` takes
+        "With `pip install mitsuba` (tested with 3.9.1), `python render.py` renders all four pictures; `python render.py 1024` takes
 1024 samples per pixel. By hand: `mitsuba -m scalar_rgb -D light=environment -D material=full -D spp=256 -o full_environment.exr
 scene.xml`; light is point or environment, material is full or diffuse.
 Your material goes into material-full.xml, in place of the bsdf with the id \"subject\"; the same without its specular lobe
