@@ -38,6 +38,10 @@ pub(crate) enum Command {
     Validate(ValidateArgs),
     /// Measure speed and accuracy on this machine, alone or beside another renderer
     Bench(BenchArgs),
+    /// Write a scene for another renderer
+    Scene(SceneArgs),
+    /// Find mistakes in a material's numbers: gloss for roughness, sRGB for linear, F0 for an index, ...
+    Lint(LintArgs),
 }
 
 #[derive(Args)]
@@ -351,4 +355,48 @@ fn assignment(text: &str) -> Result<Assignment, String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     let (side, name) = side(name.trim());
     Ok(Assignment { side, name, value: value.trim().to_owned() })
+}
+
+#[derive(Args)]
+pub(crate) struct SceneArgs {
+    #[command(subcommand)]
+    pub(crate) command: SceneCommand,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum SceneCommand {
+    /// Write a scene so that any renderer can make the pictures that `match` reads
+    Export(SceneExportArgs),
+}
+
+#[derive(Args)]
+pub(crate) struct SceneExportArgs {
+    /// reference, spheres, or a scene file (.toml)
+    #[arg(default_value = "reference")]
+    pub(crate) scene: String,
+    /// obj+exr, mitsuba, blender, usd or gltf
+    #[arg(long, value_name = "FORMAT")]
+    pub(crate) to: String,
+    /// Side of the pictures in pixels
+    #[arg(long, default_value_t = 300)]
+    pub(crate) size: usize,
+    /// Folder for the files; made if it does not exist
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct LintArgs {
+    /// MODEL:NAME=VALUE,..., JSON, or a .json file; values may be out of range
+    pub(crate) material: String,
+    /// A material that it is meant to look like: what explains the difference is rendered
+    #[arg(long, value_name = "MATERIAL")]
+    pub(crate) like: Option<String>,
+    /// Side of the pictures that are compared, in pixels
+    #[arg(long, default_value_t = 64, requires = "like")]
+    pub(crate) size: usize,
+    #[command(flatten)]
+    pub(crate) json: Json,
 }

@@ -51,6 +51,8 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Compare(args) => commands::compare::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
+        Command::Scene(args) => commands::scene::run(&args),
+        Command::Lint(args) => commands::lint::run(&args),
     }
 }
 

@@ -555,3 +555,61 @@ fn measurements_that_cannot_be_read_are_refused() {
     refused(of, &render("lafortune:weight=1/2,exponent=1/2/3"), 2, &["weight has 2 numbers for 3 lobes"]);
     refused(of, &render("merl:material=red-plastik"), 2, &["did you mean 'red-plastic'?"]);
 }
+
+#[test]
+fn a_scene_is_exported_for_every_renderer() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    for (format, file) in [
+        ("obj+exr", "scene.obj"),
+        ("mitsuba", "scene.xml"),
+        ("blender", "scene.py"),
+        ("usd", "scene.usda"),
+        ("gltf", "scene.bin"),
+    ] {
+        let made =
+            json(of, &["scene", "export", "spheres", "--to", format, "--size", "48", "-o", "out", "--json"]);
+        assert_eq!((made["scene"].as_str(), made["format"].as_str()), (Some("spheres"), Some(format)));
+        let files: Vec<&str> =
+            made["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
+        for name in [file, "README.txt", "environment.exr"] {
+            assert!(files.iter().any(|f| f.ends_with(name)), "no {name} in {files:?}");
+        }
+        assert!(files.iter().all(|f| of.join(f).is_file()));
+    }
+    refused(of, &["scene", "export", "--to", "pov", "-o", "out"], 2, &["'pov'", "obj+exr", "blender"]);
+    refused(
+        of,
+        &["scene", "export", "none.toml", "--to", "usd", "-o", "out"],
+        1,
+        &["none.toml", "reference"],
+    );
+    refused(of, &["scene", "export", "--to", "usd", "--size", "0", "-o", "out"], 1, &["1 to 8192"]);
+    std::fs::write(of.join("file"), "").unwrap();
+    refused(of, &["scene", "export", "--to", "usd", "-o", "file"], 1, &["cannot write 'file'"]);
+}
+
+#[test]
+fn mistakes_in_numbers_are_explained() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    let found = json(of, &["lint", "gltf:roughness=60,base_color=200/100/50", "--json"]);
+    let rules: Vec<&str> =
+        found["findings"].as_array().unwrap().iter().map(|f| f["rule"].as_str().unwrap()).collect();
+    assert_eq!(rules, ["exponent-as-roughness", "eight-bit-colour"]);
+    assert_eq!(found["suggestion"], "gltf:roughness=0.4238,base_color=0.5776/0.1274/0.0319");
+    let text = lookmatch(of, &["lint", "ggx:ior=0.04"]);
+    let text = String::from_utf8_lossy(&text.stdout).into_owned();
+    assert!(text.contains("fix: ior=1.5") && text.contains("suggested: ggx:ior=1.5"), "{text}");
+    let clean = lookmatch(of, &["lint", "ggx"]);
+    assert!(clean.status.success() && String::from_utf8_lossy(&clean.stdout).contains("nothing suspicious"));
+
+    let like =
+        json(of, &["lint", "ward:roughness=0.8", "--like", "ward:roughness=0.2", "--size", "24", "--json"]);
+    assert_eq!(like["explanation"]["explanations"][0]["material"], "ward:roughness=0.2");
+    refused(of, &["lint", "wrad:roughness=60"], 2, &["did you mean 'ward'?"]);
+    refused(of, &["lint", "ward:roughness=wide"], 2, &["a number in"]);
+    refused(of, &["lint", "ward", "--like", "ward:roughness=60"], 2, &["outside its range"]);
+    refused(of, &["lint", "ward", "--like", "ward", "--size", "4"], 2, &["16..=1024"]);
+    refused(of, &["lint", "none.json"], 1, &["none.json"]);
+}

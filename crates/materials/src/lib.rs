@@ -24,6 +24,7 @@ pub mod fresnel;
 mod fuzz;
 pub mod geometry;
 mod layers;
+pub mod lint;
 pub mod masking;
 mod material;
 mod metals;

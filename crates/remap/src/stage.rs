@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use lookmatch_imaging::{Fitness, Reduce, Space, lab_planes_of, squared_distance, weighted_squared_distance};
 use lookmatch_materials::Material;
 use lookmatch_rendering::{
-    DiffuseKey, Illumination, Observe, Part, Planes, Progress, Renderer, SplitLobes, TransportCache,
+    DiffuseKey, Illumination, Observe, Part, Planes, Progress, Renderer, Scene, SplitLobes, TransportCache,
 };
 use rayon::prelude::*;
 
@@ -64,20 +64,40 @@ impl Stage {
         if plan.metric.space != Space::Lab || plan.metric.reduce != Reduce::Rms {
             return Err(RemapError::Option("a remap compares in CIELAB by the root mean square".into()));
         }
+        Self::of(&plan.scene, plan.size, plan.metric, plan.mask, cache, observe)
+    }
+
+    /// Prepares the reference scene for comparisons of materials that no plan is about.
+    ///
+    /// # Errors
+    /// A size that cannot be rendered.
+    pub fn reference(size: usize, cache: &TransportCache, observe: Observe) -> Result<Self, RemapError> {
+        Self::of(&Scene::reference(), size, Fitness::default(), false, cache, observe)
+    }
+
+    /// A scene under its two lights, with a metric in CIELAB.
+    fn of(
+        scene: &Scene,
+        size: usize,
+        metric: Fitness,
+        mask: bool,
+        cache: &TransportCache,
+        observe: Observe,
+    ) -> Result<Self, RemapError> {
         let prepare = |before: f64, light| {
             let of_both = |progress| match progress {
                 Progress::Preparing(share) => observe(Progress::Preparing(before + share / 2.0)),
                 other => observe(other),
             };
-            Renderer::cached(&plan.scene, light, plan.size, cache, &of_both)
+            Renderer::cached(scene, light, size, cache, &of_both)
         };
         let point = prepare(0.0, Illumination::Point)?;
         let environment = prepare(0.5, Illumination::Environment)?;
         let on_subject = |weights: &[f32]| point.subjects().iter().map(|i| weights[*i as usize]).collect();
-        let weights = plan.mask.then(|| on_subject(point.mask().weights()));
+        let weights = mask.then(|| on_subject(point.mask().weights()));
         let diffuse = Mutex::new(HashMap::new());
         let gallery = Gallery::new(appearance_bytes(&point));
-        Ok(Self { metric: plan.metric, weights, gallery, diffuse, point, environment })
+        Ok(Self { metric, weights, gallery, diffuse, point, environment })
     }
 
     /// Renders materials, on all cores, in their order.

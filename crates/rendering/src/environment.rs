@@ -135,7 +135,7 @@ impl EnvironmentMap {
 }
 
 /// The image of a light from its [`EnvironmentMap::content`].
-fn decode_image(light: &EnvironmentLight, content: &[u8]) -> Result<Image, SceneError> {
+pub(crate) fn decode_image(light: &EnvironmentLight, content: &[u8]) -> Result<Image, SceneError> {
     let image = match light.map.as_str() {
         "designed" => designed_map(),
         "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), content)?,

@@ -90,4 +90,20 @@ pub enum SceneError {
         /// The number asked for.
         samples: u32,
     },
+    /// The scene cannot be written for another renderer.
+    #[error("scene '{scene}' cannot be exported: {message}")]
+    Export {
+        /// Name of the scene.
+        scene: String,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A file or folder cannot be written.
+    #[error("cannot write '{}': {source}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
 }

@@ -5,11 +5,13 @@ pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod eval;
 pub(crate) mod inspect;
+pub(crate) mod lint;
 pub(crate) mod models;
 pub(crate) mod pairs;
 pub(crate) mod remap;
 pub(crate) mod render;
 pub(crate) mod renderers;
+pub(crate) mod scene;
 pub(crate) mod validate;
 
 use std::path::Path;
