@@ -29,6 +29,8 @@ use crate::{Entry, Plan, RemapError, Stage};
 const SCENES: [&str; 2] = ["reference-point", "reference-environment"];
 /// Fitness of a candidate that could not be rendered: worse than any picture can be.
 const FAILED: f64 = 1e9;
+/// Bowls that are looked into before a search gives up to find the bottom.
+const ROUNDS: usize = 8;
 /// Memory for looks, in bytes.
 const CAPACITY: usize = 500 << 20;
 /// Share of a body's brightness that its measurement may be off by.
@@ -121,7 +123,7 @@ impl CrossStage {
                 let set = studio.set_scene(name, &plan.scene, light, plan.size);
                 set.map_err(|reason| RemapError::Render(format!("{renderer}: {reason}")))?;
             }
-            archives.push(Archive::new(studio, plan.size, plan.seed));
+            archives.push(Archive::new(studio, plan.size, sampling.samples, plan.seed));
         }
         let coverage = plan.scene.coverage(plan.size);
         let subjects = own.views()[0].subjects().iter().enumerate();
@@ -345,6 +347,14 @@ fn noise(takes: &Takes) -> Option<Image> {
     Some(noise)
 }
 
+/// The end of a search.
+struct Settled {
+    best: Point,
+    is_decided: bool,
+    /// Samples of the pictures that decided it.
+    samples: u32,
+}
+
 /// The fitness of target points against one source material.
 struct CrossMatch<'a> {
     plan: &'a Plan,
@@ -381,10 +391,11 @@ impl CrossMatch<'_> {
 
     /// Renders candidates around the best with more and more samples, until it is known which is the best or the budget ends;
     /// says which it was.
-    fn settled(&mut self, found: Point, problem: &Problem, most: u32) -> Result<(Point, bool), RemapError> {
+    fn settled(&mut self, found: Point, problem: &Problem, most: u32) -> Result<Settled, RemapError> {
         let mut samples = self.stage.sampling.samples;
         let mut centre = found;
-        for round in 0.. {
+        let mut round = 0;
+        for _ in 0..ROUNDS {
             if (self.stop)() {
                 return Err(stopped());
             }
@@ -392,7 +403,8 @@ impl CrossMatch<'_> {
             let points = bowl.candidates(self.scores.keys());
             let scores = self.scored(&points, samples)?;
             if scores.iter().all(|score| score.error == 0.0 || score.value >= FAILED) {
-                break;
+                // Without noise the best that was seen is the best.
+                return Ok(Settled { best: centre, is_decided: true, samples });
             }
             let scored: Vec<(Point, Score)> =
                 points.into_iter().zip(scores).filter(|(_, score)| score.value < FAILED).collect();
@@ -401,13 +413,16 @@ impl CrossMatch<'_> {
             let squares = |(point, Score { value, .. }): (Point, Score)| (point, value * value.abs());
             let bottom = bowl.bottom(&scored.into_iter().map(squares).collect::<Vec<_>>());
             centre = bottom.point;
+            if bottom.is_on_side {
+                continue;
+            }
             if bottom.is_known || samples >= most {
-                return Ok((centre, bottom.is_known));
+                return Ok(Settled { best: centre, is_decided: bottom.is_known, samples });
             }
             samples = (4 * samples).min(most);
+            round += 1;
         }
-        // Without noise the best that was seen is the best.
-        Ok((centre, true))
+        Ok(Settled { best: centre, is_decided: false, samples })
     }
 }
 
@@ -479,10 +494,10 @@ impl CrossStage {
                 reasons.last().unwrap_or_else(|| "no target could be rendered".into()),
             ));
         }
-        let (best, is_decided) = objective.settled(found.best, problem, most)?;
+        let Settled { best, is_decided, samples } = objective.settled(found.best, problem, most)?;
         let compared = objective.scores.len();
         let target_values = problem.lattice.values(&best);
-        let (target, body) = self.with_body(plan, &source, &target_values, level)?;
+        let (target, body) = self.with_body(plan, &source, &target_values, (level, samples))?;
         let score = self.score(&seen, &*self.look(&target, true, samples)?, true);
         let ([nrmsd, nrmsd_masked], floor) = self.nrmsd(&source, &target, samples)?;
         let fitness = score.value.max(0.0);
@@ -518,7 +533,7 @@ impl CrossStage {
         plan: &Plan,
         source: &Material,
         values: &[f64],
-        level: [f64; 3],
+        (level, samples): ([f64; 3], u32),
     ) -> Result<(Material, [f64; 3]), RemapError> {
         let look = self.carried(source, level)?;
         if plan.to.model().renderer.is_none() {
@@ -535,7 +550,7 @@ impl CrossStage {
             return Ok((target, gain));
         }
         for _ in 0..BODY_STEPS {
-            let seen = self.look(&target, true, self.sampling.samples)?;
+            let seen = self.look(&target, true, samples)?;
             let step = ratio(level, seen.level());
             if step.iter().all(|step| (step - 1.0).abs() < BODY_TOLERANCE) {
                 break;

@@ -20,15 +20,22 @@ const LOOKED_AT: u64 = 20_000;
 pub(crate) struct Bowl<'a> {
     lattice: &'a Lattice,
     centre: Point,
+    /// Itself.
     bounds: Bounds,
+    /// What lies around it.
+    within: Bounds,
     /// Axes along which it has a shape: not those of switches.
     axes: Vec<usize>,
+    /// True where it is as narrow as it gets: the bottom of a wider one, whose sides are not alike, is off to the flatter side.
+    is_narrow: bool,
 }
 
 /// The bottom of a bowl.
 pub(crate) struct Bottom {
     pub(crate) point: Point,
     pub(crate) is_known: bool,
+    /// True where it lies on a side of the bowl, and may be deeper behind it.
+    pub(crate) is_on_side: bool,
 }
 
 impl<'a> Bowl<'a> {
@@ -42,24 +49,29 @@ impl<'a> Bowl<'a> {
             bounds.low[*axis] = within.low[*axis].max(centre[*axis].saturating_sub(reach));
             bounds.high[*axis] = within.high[*axis].min(centre[*axis] + reach);
         }
-        Self { lattice, centre: centre.clone(), bounds, axes }
+        Self {
+            lattice,
+            centre: centre.clone(),
+            bounds,
+            within: within.clone(),
+            axes,
+            is_narrow: reach == REACH[1],
+        }
     }
 
-    /// The candidates to look at: known points of the bowl, those nearest to its middle, and as many new ones as a fit lacks.
+    /// The candidates to look at, spread evenly over the bowl: known ones where they lie within a level of where one is wanted.
     pub(crate) fn candidates<'p>(&self, known: impl Iterator<Item = &'p Point>) -> Vec<Point> {
         let wanted = CANDIDATES * self.coefficients();
-        let mut points: Vec<Point> = known.filter(|point| self.contains(point)).cloned().collect();
-        points.sort_by_key(|point| (self.distance(point), point.clone()));
-        points.truncate(wanted);
-        if !points.contains(&self.centre) {
-            points.push(self.centre.clone());
-        }
-        // A Kronecker sequence fills the bowl evenly, whatever its dimension.
+        let mut known: Vec<Point> = known.filter(|point| self.contains(point)).cloned().collect();
+        known.sort_unstable();
+        let mut points = vec![self.centre.clone()];
         for k in 1..8 * wanted as u32 {
             if points.len() >= wanted {
                 break;
             }
             let point = self.spread(k);
+            let near = known.iter().filter(|other| distance(other, &point) <= 1 && !points.contains(other));
+            let point = near.min_by_key(|other| distance(other, &point)).unwrap_or(&point).clone();
             if !points.contains(&point) {
                 points.push(point);
             }
@@ -78,7 +90,9 @@ impl<'a> Bowl<'a> {
         };
         let freedom = candidates.len().saturating_sub(self.coefficients());
         let inverse = (design.transpose() * &design).try_inverse().filter(|_| freedom > 0);
-        let Some(inverse) = inverse else { return Bottom { point: best(), is_known: false } };
+        let Some(inverse) = inverse else {
+            return Bottom { point: best(), is_known: false, is_on_side: false };
+        };
         let fit = &inverse * design.transpose() * &scores;
         let residual = (&scores - &design * &fit).norm_squared() / freedom as f64;
         let value = |point: &Point| self.terms(point).iter().zip(fit.iter()).map(|(t, c)| t * c).sum::<f64>();
@@ -96,8 +110,10 @@ impl<'a> Bowl<'a> {
                 f64::INFINITY
             }
         };
-        let is_known = (0..self.axes.len()).all(|k| error(k) < KNOWN);
-        Bottom { point: least.unwrap_or_else(best), is_known }
+        let point = least.unwrap_or_else(best);
+        let is_on_side = self.is_on_side(&point);
+        let is_known = self.is_narrow && !is_on_side && (0..self.axes.len()).all(|k| error(k) < KNOWN);
+        Bottom { point, is_known, is_on_side }
     }
 
     /// 1, x, x², and products.
@@ -128,8 +144,12 @@ impl<'a> Bowl<'a> {
         (0..point.len()).all(|axis| (self.bounds.low[axis]..=self.bounds.high[axis]).contains(&point[axis]))
     }
 
-    fn distance(&self, point: &Point) -> u32 {
-        point.iter().zip(&self.centre).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
+    /// True where a point lies on a side of the bowl behind which the lattice goes on.
+    fn is_on_side(&self, point: &Point) -> bool {
+        self.axes.iter().any(|axis| {
+            let (low, high, index) = (self.bounds.low[*axis], self.bounds.high[*axis], point[*axis]);
+            index == low && low > self.within.low[*axis] || index == high && high < self.within.high[*axis]
+        })
     }
 
     /// The `k`-th of points that fill the bowl evenly (Roberts 2018: powers of the root of x^(d+1) = x + 1).
@@ -155,6 +175,11 @@ impl<'a> Bowl<'a> {
     }
 }
 
+/// Levels between two points along the axis where they are farthest apart.
+fn distance(a: &Point, b: &Point) -> u32 {
+    a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,13 +197,16 @@ mod tests {
         0.01 * (a * a + a * b + 2.0 * b * b) + noise * (f64::from(random) / 1009.0 - 0.5)
     }
 
-    fn found(noise: f64) -> Bottom {
+    fn found(noise: f64, round: u32) -> Bottom {
         let lattice = lattice();
         let whole = Bounds::full(&lattice);
-        let bowl = Bowl::around(&lattice, &vec![1, 27, 26], &whole, 0);
+        let bowl = Bowl::around(&lattice, &vec![1, 27, 26], &whole, round);
         let candidates = bowl.candidates(std::iter::empty());
         assert_eq!(candidates.len(), 24);
-        assert!(candidates.iter().all(|p| p[0] == 1 && p[1].abs_diff(27) <= 12 && p[2].abs_diff(26) <= 12));
+        let reach = if round == 0 { 12 } else { 6 };
+        assert!(
+            candidates.iter().all(|p| p[0] == 1 && p[1].abs_diff(27) <= reach && p[2].abs_diff(26) <= reach)
+        );
         let scored: Vec<(Point, f64)> =
             candidates.into_iter().map(|p| (p.clone(), score(&p, noise))).collect();
         bowl.bottom(&scored)
@@ -186,21 +214,24 @@ mod tests {
 
     #[test]
     fn the_bottom_is_found_through_noise() {
-        let clean = found(0.0);
-        assert_eq!((clean.point, clean.is_known), (vec![1, 31, 22], true));
-        let noisy = found(1.0);
+        let [wide, narrow] = [found(0.0, 0), found(0.0, 1)];
+        assert_eq!((wide.point, wide.is_known), (vec![1, 31, 22], false));
+        assert_eq!((narrow.point, narrow.is_known), (vec![1, 31, 22], true));
+        let noisy = found(1.0, 0);
         let off = noisy.point.iter().zip([1, 31, 22]).map(|(a, b)| a.abs_diff(b)).max().unwrap();
         assert!(off <= 2 && !noisy.is_known, "{:?}", noisy.point);
-        assert!(!found(100.0).is_known);
+        assert!(!found(100.0, 1).is_known);
     }
 
     #[test]
-    fn known_points_are_looked_at_first() {
+    fn known_points_stand_in_for_their_neighbours() {
         let lattice = lattice();
         let bowl = Bowl::around(&lattice, &vec![1, 5, 5], &Bounds::full(&lattice), 1);
-        let known = [vec![1, 6, 6], vec![0, 5, 5], vec![1, 40, 5]];
+        let wanted = bowl.candidates(std::iter::empty());
+        let beside = vec![1, wanted[3][1] + 1, wanted[3][2]];
+        let known = [beside.clone(), vec![0, 5, 5], vec![1, 40, 5]];
         let candidates = bowl.candidates(known.iter());
-        assert_eq!(candidates[0], known[0], "the others are not in the bowl");
-        assert!(candidates[1..].iter().all(|p| !known.contains(p)));
+        assert!(candidates.contains(&beside), "it stands in for its neighbour");
+        assert!(candidates.iter().all(|p| *p != known[1] && *p != known[2]), "they are not in the bowl");
     }
 }

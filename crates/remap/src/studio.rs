@@ -111,6 +111,8 @@ const CAPACITY: usize = 1 << 30;
 pub(crate) struct Archive {
     pub(crate) studio: Arc<dyn Studio>,
     kept: Mutex<LruCache<(Key, &'static str), Arc<Takes>>>,
+    /// Samples of a picture at first.
+    samples: u32,
     /// Turns the noise of all pictures.
     seed: u64,
     counts: Mutex<Counts>,
@@ -134,11 +136,11 @@ pub struct Counts {
 const REASONS: usize = 5;
 
 impl Archive {
-    pub(crate) fn new(studio: Arc<dyn Studio>, size: usize, seed: u64) -> Self {
+    pub(crate) fn new(studio: Arc<dyn Studio>, size: usize, samples: u32, seed: u64) -> Self {
         let bytes = 2 * size * size * size_of::<[f32; 3]>();
         let room = NonZeroUsize::new(CAPACITY / bytes.max(1)).unwrap_or(NonZeroUsize::MIN);
         let kept = Mutex::new(LruCache::new(room));
-        Self { studio, kept, seed, counts: Mutex::default() }
+        Self { studio, kept, samples, seed, counts: Mutex::default() }
     }
 
     /// Costs so far.
@@ -187,7 +189,11 @@ impl Archive {
         let halves = if self.studio.has_noise() { 2 } else { 1 };
         let lacking = |task: &&Task| !task.known.as_ref().is_some_and(|t| self.is_enough(t, samples));
         let tasks: Vec<&Task> = tasks.iter().filter(lacking).collect();
-        let shots: Vec<Shot> = tasks.iter().flat_map(|task| task.shots(halves, samples, self.seed)).collect();
+        let batches: Vec<Vec<Batch>> =
+            tasks.iter().map(|task| task.batches(halves, self.samples, samples)).collect();
+        let shots =
+            tasks.iter().zip(&batches).flat_map(|(task, batches)| task.shots(halves, batches, self.seed));
+        let shots: Vec<Shot> = shots.collect();
         if shots.is_empty() {
             return;
         }
@@ -196,13 +202,14 @@ impl Archive {
         let waited = begin.elapsed();
         let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
         counts.waited += waited;
-        for task in tasks {
-            let halves: Vec<Result<Image, String>> = images.by_ref().take(halves as usize).collect();
-            counts.renders += halves.len();
-            counts.failed += halves.iter().filter(|half| half.is_err()).count();
-            match halves.into_iter().collect::<Result<Vec<Image>, String>>() {
-                Ok(halves) => {
-                    self.known().put(task.identity.clone(), Arc::new(task.joined(halves, samples)));
+        for (task, batches) in tasks.into_iter().zip(batches) {
+            let images: Vec<Result<Image, String>> =
+                images.by_ref().take(halves as usize * batches.len()).collect();
+            counts.renders += images.len();
+            counts.failed += images.iter().filter(|image| image.is_err()).count();
+            match images.into_iter().collect::<Result<Vec<Image>, String>>() {
+                Ok(images) => {
+                    self.known().put(task.identity.clone(), Arc::new(task.joined(&batches, images)));
                 }
                 Err(reason) if counts.reasons.len() < REASONS => counts.reasons.push(reason),
                 Err(_) => {}
@@ -227,41 +234,58 @@ impl Task<'_> {
         self.known.as_ref().map_or(0, |known| known.samples)
     }
 
-    /// Samples of each new half.
-    fn missing(&self, halves: u32, samples: u32) -> u32 {
-        samples.saturating_sub(self.known_samples()).div_ceil(halves).max(1)
+    /// What is to be added: the first pictures, then three times as many samples as there are already, and so on. All pictures
+    /// that grow to the same number grow alike, and share their noise where they share seeds.
+    fn batches(&self, halves: u32, first: u32, samples: u32) -> Vec<Batch> {
+        let mut known = self.known_samples();
+        let mut batches = Vec::new();
+        while known < samples {
+            let next = if known == 0 { first } else { 4 * known };
+            let batch = Batch { after: known, samples: (next.min(samples) - known).div_ceil(halves).max(1) };
+            known += batch.samples * halves;
+            batches.push(batch);
+        }
+        batches
     }
 
     /// Each lobe has noise of its own, which a fit through many averages out. Bodies of all colours under one lobe share theirs,
     /// which cancels in their differences.
-    fn shots(&self, halves: u32, samples: u32, seed: u64) -> impl Iterator<Item = Shot<'_>> {
+    fn shots<'b>(&'b self, halves: u32, batches: &'b [Batch], seed: u64) -> impl Iterator<Item = Shot<'b>> {
         let lobe = self.material.blackened().map_or_else(|| key(self.material), |body| key(&body.black));
         let mixed = lobe.iter().fold(seed, |mix, word| (mix ^ word).wrapping_mul(0x0000_0100_0000_01b3));
-        let first = ((mixed >> 20) as u32).wrapping_add(2 * self.known_samples());
-        let samples = self.missing(halves, samples);
-        (0..halves).map(move |half| Shot {
+        let first = (mixed >> 20) as u32;
+        let shot = move |(batch, half): (&Batch, u32)| Shot {
             scene: self.identity.1,
             material: self.material,
-            samples,
-            seed: first.wrapping_add(half) & 0x7fff_ffff,
-        })
+            samples: batch.samples,
+            seed: first.wrapping_add(2 * batch.after + half) & 0x7fff_ffff,
+        };
+        batches.iter().flat_map(move |batch| (0..halves).map(move |half| (batch, half))).map(shot)
     }
 
-    /// New halves added to those that were known.
-    fn joined(&self, halves: Vec<Image>, samples: u32) -> Takes {
-        let count = halves.len() as u32;
-        let added = self.missing(count, samples) * count;
-        match &self.known {
-            None => Takes { halves, samples: added },
-            Some(known) => {
-                let total = known.samples + added;
-                let share = added as f32 / total as f32;
-                let halves =
-                    known.halves.iter().zip(&halves).map(|(old, new)| mixed(old, new, share)).collect();
-                Takes { halves, samples: total }
-            }
+    /// New pictures, batch by batch, added to those that were known.
+    fn joined(&self, batches: &[Batch], images: Vec<Image>) -> Takes {
+        let halves = images.len() / batches.len().max(1);
+        let mut takes = self.known.as_deref().cloned().unwrap_or(Takes { halves: Vec::new(), samples: 0 });
+        for (batch, new) in batches.iter().zip(images.chunks(halves.max(1))) {
+            let added = batch.samples * halves as u32;
+            takes.samples += added;
+            let share = added as f32 / takes.samples as f32;
+            takes.halves = match takes.halves.is_empty() {
+                true => new.to_vec(),
+                false => takes.halves.iter().zip(new).map(|(old, new)| mixed(old, new, share)).collect(),
+            };
         }
+        takes
     }
+}
+
+/// Samples to be added to both halves of a picture.
+struct Batch {
+    /// Samples of both together that there were before.
+    after: u32,
+    /// Samples of each half.
+    samples: u32,
 }
 
 /// The studio that shows a model.
