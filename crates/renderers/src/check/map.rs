@@ -1,0 +1,175 @@
+//! The environment: a mirror ball and a Lambert ball alone under a map that looks different from every side.
+
+use lookmatch_imaging::Image;
+
+use super::closed_form::{Finish, Known, Sky, World};
+use super::compare::{self, Suspect};
+use super::finding::Limit;
+use super::session::{Session, Worn, ball, marked_map};
+use super::{Check, Finding};
+use crate::{Light, RendererError};
+
+pub(super) const MIRROR: Check = Check {
+    name: "mirror",
+    about: "a mirror ball alone under a marked map, and the map behind it",
+    run: run_mirror,
+};
+
+pub(super) const LAMBERT: Check =
+    Check { name: "map", about: "a Lambert ball alone under a marked map: its irradiance", run: run_lambert };
+
+/// Words by which renderers speak of their environments.
+const WORDS: [&str; 5] = ["environment", "map", "mirror", "reflection", "prefiltered"];
+
+fn run_mirror(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError> {
+    if !session.has(Light::Environment, finding) {
+        return Ok(());
+    }
+    let Some(worn) = session.mirror() else {
+        finding.skip("it has no mirror (check.mirror is null)");
+        return Ok(());
+    };
+    let got = picture(session, "mirror", &worn)?;
+    let known = |map: Image, is_nearest| known(session, Sky::new(map, is_nearest), Finish::Mirror([1.0; 3]));
+    let linear = known(marked_map(), false);
+    let nearest = known(marked_map(), true);
+    finding.show("ball", &got, &linear.image);
+    let mut is_right = true;
+    for (what, takes) in [("ball", (|c| c > 0.999) as fn(f32) -> bool), ("background", |c| c == 0.0)] {
+        let chosen = linear.smooth(takes);
+        let share = |expected: &Known| compare::share_close(&got, &expected.image, &chosen, 1.0);
+        let name = format!("share of the {what} within 1 %");
+        is_right &= finding.measure(name, share(&linear).max(share(&nearest)), Limit::least(0.97));
+        let ratio = compare::median_ratio(&got, &linear.image, &chosen);
+        is_right &= finding.measure(format!("median ratio of the {what}"), ratio, Limit::between(0.99, 1.01));
+        if !is_right {
+            name_mistake(&got, &linear.image, &chosen, what, finding, &|map| known(map, false).image);
+        }
+    }
+    if !is_right {
+        excuse(session, finding);
+    }
+    Ok(())
+}
+
+fn run_lambert(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError> {
+    if !session.has(Light::Environment, finding) {
+        return Ok(());
+    }
+    let (worn, albedo) = session.lambert([0.5; 3]);
+    let got = picture(session, "map", &worn)?;
+    let known = |map: Image| known(session, Sky::new(map, false), Finish::Lambert(albedo));
+    let expected = known(marked_map());
+    finding.show("ball", &got, &expected.image);
+    let chosen = expected.smooth(|cover| cover > 0.999);
+    let ratio = compare::median_ratio(&got, &expected.image, &chosen);
+    let mut is_right = finding.measure("median ratio", ratio, Limit::between(0.98, 1.02));
+    // Noise goes into the likeness, a turned map far more.
+    let likeness = compare::likeness(&got, &expected.image, &chosen);
+    is_right &= finding.measure("likeness", likeness, Limit::least(0.985));
+    if !is_right {
+        name_mistake(&got, &expected.image, &chosen, "ball", finding, &|map| known(map).image);
+        excuse(session, finding);
+    }
+    Ok(())
+}
+
+fn picture(session: &Session, name: &str, worn: &Worn) -> Result<Image, RendererError> {
+    let mut scene = ball();
+    scene.point_lights.clear();
+    scene.environment = Some(session.map("marked", &marked_map())?);
+    session.load(name, &scene)?;
+    session.picture(name, worn)
+}
+
+fn known(session: &Session, sky: Sky, finish: Finish) -> Known {
+    let mut scene = ball();
+    scene.point_lights.clear();
+    let points = if matches!(finish, Finish::Mirror(_)) { 8 } else { 4 };
+    World::new(&scene, Some(sky), finish).picture(session.options.size, points)
+}
+
+/// Says which way the map is turned, or what else is wrong.
+fn name_mistake(
+    got: &Image,
+    expected: &Image,
+    chosen: &[bool],
+    what: &str,
+    finding: &mut Finding,
+    picture: &dyn Fn(Image) -> Image,
+) {
+    let map = marked_map();
+    let honest = compare::likeness(got, expected, chosen);
+    let turns = turns().into_iter().map(|(words, turn)| (words, picture(turned(&map, turn))));
+    let turns: Vec<(String, Image)> = turns.collect();
+    let likeness = turns.iter().map(|(words, seen)| (compare::likeness(got, seen, chosen), words));
+    let best = likeness.max_by(|a, b| a.0.total_cmp(&b.0));
+    finding.measure(format!("likeness of the {what}"), honest, Limit::NONE);
+    if let Some((likeness, words)) = best
+        && likeness > honest + 0.01
+        && likeness > 0.8
+    {
+        finding.fault(format!("{what}: {words}"));
+        return;
+    }
+    let mut suspects = compare::tones(expected);
+    suspects.push(Suspect::new("the map has no effect", Image::new(expected.width(), expected.height())));
+    match compare::explain(got, expected, chosen, &suspects) {
+        Some(cause) => finding.fault(format!("{what}: {cause}")),
+        None if honest > 0.8 => {
+            finding.fault(format!("{what}: the map lies as it should, but is not quite the same"))
+        }
+        None => finding.fault(format!("{what}: no turn of the map explains it")),
+    }
+}
+
+/// What is wrong may be admitted; a turned or missing map is not.
+fn excuse(session: &Session, finding: &mut Finding) {
+    let likeness = finding.numbers.iter().filter(|n| n.name.starts_with("likeness"));
+    let is_oriented = likeness.fold(1.0_f64, |a, n| a.min(n.value)) > 0.8
+        && !finding
+            .remarks
+            .iter()
+            .any(|remark| remark.contains("the map is") || remark.contains("factor of"));
+    if let Some(sentence) = session.admitted(&WORDS).filter(|_| is_oriented) {
+        finding.excuse(sentence);
+    }
+}
+
+/// How a map can lie: turned by quarters about the y axis, mirrored before that, flipped.
+#[derive(Clone, Copy)]
+struct Turn {
+    quarters: usize,
+    is_mirrored: bool,
+    is_flipped: bool,
+}
+
+/// All but the right one, in words.
+fn turns() -> Vec<(String, Turn)> {
+    let mut turns = Vec::new();
+    for code in 1..16 {
+        let turn = Turn { quarters: code % 4, is_mirrored: code & 4 != 0, is_flipped: code & 8 != 0 };
+        let mut words = Vec::new();
+        if turn.is_mirrored {
+            words.push("mirrored (u runs the other way)".to_owned());
+        }
+        if turn.is_flipped {
+            words.push("upside down (v is flipped: row 0 is +Y)".to_owned());
+        }
+        if turn.quarters > 0 {
+            words.push(format!("turned by {} degrees about the y axis", 90 * turn.quarters));
+        }
+        turns.push((format!("the map is {}", words.join(" and ")), turn));
+    }
+    turns
+}
+
+/// What is at −Z moves towards +X by so many quarters.
+fn turned(map: &Image, turn: Turn) -> Image {
+    let (width, height) = (map.width(), map.height());
+    Image::from_fn(width, height, |x, y| {
+        let x = (x + width - turn.quarters * width / 4) % width;
+        let x = if turn.is_mirrored { width - 1 - x } else { x };
+        map.get(x, if turn.is_flipped { height - 1 - y } else { y })
+    })
+}
