@@ -64,7 +64,7 @@ pub(crate) struct Sky {
 
 impl Sky {
     /// Patches of the map, across, that stand for its irradiance.
-    const PATCHES: usize = 32;
+    const PATCHES: usize = 64;
 
     pub(crate) fn new(map: Image, is_nearest: bool) -> Self {
         let side = (map.width() / Self::PATCHES).max(1);

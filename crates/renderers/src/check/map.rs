@@ -66,7 +66,7 @@ fn run_lambert(session: &mut Session, finding: &mut Finding) -> Result<(), Rende
     let mut is_right = finding.measure("median ratio", ratio, Limit::between(0.98, 1.02));
     // Noise goes into the likeness, a turned map far more.
     let likeness = compare::likeness(&got, &expected.image, &chosen);
-    is_right &= finding.measure("likeness", likeness, Limit::least(0.985));
+    is_right &= finding.measure("likeness", likeness, Limit::least(0.99));
     if !is_right {
         name_mistake(&got, &expected.image, &chosen, "ball", finding, &|map| known(map).image);
         excuse(session, finding);
@@ -106,7 +106,7 @@ fn name_mistake(
     let best = likeness.max_by(|a, b| a.0.total_cmp(&b.0));
     finding.measure(format!("likeness of the {what}"), honest, Limit::NONE);
     if let Some((likeness, words)) = best
-        && likeness > honest + 0.01
+        && 1.0 - likeness < 0.5 * (1.0 - honest)
         && likeness > 0.8
     {
         finding.fault(format!("{what}: {words}"));

@@ -55,18 +55,21 @@ fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError
             "more samples do not take noise away: they are not heeded, or two seeds share their samples",
         );
     }
-    let stray = stray(&first.image, &second.image);
-    if !finding.measure("stray pixels (30 times the noise), share", stray, Limit::most(0.005)) {
-        finding
-            .remark("single pixels are far off (fireflies): light is met by chance that should be aimed at");
+    let stray = stray(&first.image, &second.image, &finer.image);
+    if !finding.measure("stray pixels, share", stray, Limit::most(0.002)) {
+        finding.remark(
+            "single pixels are far too bright (fireflies): light is met by chance that should be aimed at",
+        );
     }
     finding.show("16", &first.image, &finer.image);
     Ok(())
 }
 
-/// Share of pixels whose difference is 30 times the usual one among those of the same brightness.
-fn stray(a: &Image, b: &Image) -> f64 {
-    let differences = || a.pixels().iter().zip(b.pixels()).map(|(a, b)| f64::from((a[1] - b[1]).abs()));
-    let limit = 30.0 * compare::median(differences().filter(|d| *d > 0.0).collect());
-    differences().filter(|d| *d > limit).count() as f64 / a.pixels().len() as f64
+/// Share of pixels that differ by three times what almost all of the picture stays below.
+fn stray(a: &Image, b: &Image, usual: &Image) -> f64 {
+    let mut values: Vec<f32> = usual.pixels().iter().map(|p| p[1]).collect();
+    values.sort_by(f32::total_cmp);
+    let limit = 3.0 * values[values.len() * 99 / 100];
+    let pairs = a.pixels().iter().zip(b.pixels());
+    pairs.filter(|(a, b)| (a[1] - b[1]).abs() > limit).count() as f64 / values.len() as f64
 }

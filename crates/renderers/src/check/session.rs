@@ -222,7 +222,7 @@ pub(crate) fn checkerboard() -> Plane {
 }
 
 /// A map that looks different from every side: white, red, green and blue quarters around the horizon from the left edge,
-/// darker above and checked below, with one bright patch in the upper left corner.
+/// dark above and darker below, where it is checked, with one bright patch in the upper left corner.
 pub(crate) fn marked_map() -> Image {
     let (width, height) = (256, 128);
     let quarters = [[1.0, 1.0, 1.0], [1.0, 0.1, 0.1], [0.1, 1.0, 0.1], [0.1, 0.1, 1.0_f32]];
@@ -230,8 +230,10 @@ pub(crate) fn marked_map() -> Image {
         let scale = match (8 * y / height, 16 * x / width) {
             (0 | 1, 0 | 1) => return [3.0, 2.0, 0.5],
             (0 | 1, _) => 0.1,
-            (row @ 5.., column) if (row + column) % 2 == 0 => 0.4,
-            _ => 1.0,
+            (2 | 3, _) => 1.0,
+            (4, _) => 0.5,
+            (row, column) if (row + column) % 2 == 0 => 0.12,
+            _ => 0.3,
         };
         quarters[4 * x / width].map(|c| scale * c)
     })

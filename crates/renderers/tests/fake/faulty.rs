@@ -5,7 +5,8 @@
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read, Write};
 use std::process::exit;
-use std::thread::sleep;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
 use std::time::Duration;
 
 use glam::DVec3;
@@ -23,12 +24,7 @@ fn main() {
     let mistake = std::env::args().nth(1).unwrap_or_default();
     let mut worker =
         Worker { mistake, scenes: BTreeMap::new(), finish: Finish::Lambert([0.5; 3]), renders: 0 };
-    let mut stdin = io::stdin().lock();
-    let mut line = String::new();
-    while stdin.read_line(&mut line).unwrap_or(0) > 0 {
-        let request: Value = serde_json::from_str(&line).unwrap();
-        let mut data = vec![0; request["bytes"].as_u64().unwrap_or(0) as usize];
-        stdin.read_exact(&mut data).unwrap();
+    for (request, data) in read_requests(worker.has("lingers")) {
         let (mut answer, data) = match worker.answer(&request, &data) {
             Ok(answer) => answer,
             Err(error) => (json!({ "error": error }), Vec::new()),
@@ -40,11 +36,28 @@ fn main() {
         if request["request"] == "shutdown" {
             exit(if worker.has("exit-status") { 3 } else { 0 });
         }
-        line.clear();
     }
-    if worker.has("lingers") {
-        sleep(Duration::from_secs(60));
-    }
+}
+
+/// Requests as they come; the end of the input ends the process in the middle of a render, unless it lingers.
+fn read_requests(lingers: bool) -> Receiver<(Value, Vec<u8>)> {
+    let (sender, requests) = channel();
+    thread::spawn(move || {
+        let mut stdin = io::stdin().lock();
+        let mut line = String::new();
+        while stdin.read_line(&mut line).unwrap_or(0) > 0 {
+            let request: Value = serde_json::from_str(&line).unwrap();
+            let mut data = vec![0; request["bytes"].as_u64().unwrap_or(0) as usize];
+            stdin.read_exact(&mut data).unwrap();
+            sender.send((request, data)).unwrap();
+            line.clear();
+        }
+        if lingers {
+            thread::sleep(Duration::from_secs(60));
+        }
+        exit(0);
+    });
+    requests
 }
 
 struct Worker {
