@@ -37,7 +37,7 @@ fn a_right_worker_passes() {
         let Finding { check, numbers, remarks, .. } = finding;
         assert_eq!(finding.outcome, Outcome::Passed, "{check}: {numbers:?}, {remarks:?}");
     }
-    assert_eq!(report.findings.len(), 11);
+    assert_eq!(report.findings.len(), 12);
     let sheets: Vec<&str> =
         report.findings.iter().flat_map(|f| &f.pictures).map(|p| p.name.as_str()).collect();
     assert!(
@@ -74,6 +74,8 @@ fn mistakes_of_the_light_are_named() {
     is_named("map-flipped", "mirror", "upside down");
     is_named("map-flipped", "map", "upside down");
     is_named("blur", "mirror", "not quite the same");
+    is_named("bounce", "interreflection", "although capabilities.interreflection is false");
+    is_named("no-bounce", "interreflection", "although capabilities.interreflection is true");
 }
 
 #[test]

@@ -87,7 +87,8 @@ fn mistakes(scene: &Scene, world: &World, expected: &Image, albedo: [f64; 3]) ->
         other("the camera's `up` is not heeded: it is the y axis", &|s| s.camera.up = [0.0, 1.0, 0.0]);
     let single = other("only the first sphere is seen", &|s| s.spheres.truncate(1));
     let unshaded = {
-        let world = World { has_shadows: false, ..world.clone() };
+        let mut world = world.clone();
+        world.has_shadows = false;
         ("one ball casts no shadow on the other".to_owned(), world.picture(last + 1, 4).image)
     };
     vec![
@@ -203,14 +204,11 @@ impl Fit {
 }
 
 /// A view that is bent by four numbers, each of which moves the edge of the picture by so many pixels.
-fn bent(view: View, at: DVec4, pixel: f64) -> View {
-    let zoom = (1.0 + at.z * pixel).max(0.1);
-    View {
-        shift: [at.x * pixel, at.y * pixel],
-        zoom,
-        roll: (at.w * pixel).clamp(-FRAC_PI_2, FRAC_PI_2),
-        ..view
-    }
+fn bent(mut view: View, at: DVec4, pixel: f64) -> View {
+    view.shift = [at.x * pixel, at.y * pixel];
+    view.zoom = (1.0 + at.z * pixel).max(0.1);
+    view.roll = (at.w * pixel).clamp(-FRAC_PI_2, FRAC_PI_2);
+    view
 }
 
 fn grey(image: &Image) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! Pictures that are known without rendering: Lambert or mirror spheres on a checkerboard under point lights and a map.
 //!
-//! All conventions are those of `docs/renderer-protocol.md`. Light takes no second bounce, a mirror excepted: scenes are
-//! chosen so that there is none. Pictures are compared with these, so nothing here is shared with a renderer.
+//! All conventions are those of `docs/renderer-protocol.md`. Light takes no second bounce unless asked for, a mirror excepted:
+//! scenes are chosen so that there is none. Pictures are compared with these, so nothing here is shared with a renderer.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,11 +21,11 @@ pub(crate) enum Finish {
 /// A pinhole camera; the fields after the axes bend what it sees away from what it should.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
-    pub(crate) eye: DVec3,
-    pub(crate) forward: DVec3,
-    pub(crate) right: DVec3,
-    pub(crate) up: DVec3,
-    pub(crate) tangent: f64,
+    eye: DVec3,
+    forward: DVec3,
+    right: DVec3,
+    up: DVec3,
+    tangent: f64,
     /// How far the picture lies to the right of and below its place, in halves of its side.
     pub(crate) shift: [f64; 2],
     /// How much more than it should the picture holds.
@@ -127,14 +127,23 @@ fn colour(c: [f32; 3]) -> DVec3 {
 #[derive(Clone, Debug)]
 pub(crate) struct World {
     pub(crate) view: View,
-    pub(crate) spheres: Vec<(DVec3, f64)>,
-    pub(crate) plane: Option<Plane>,
-    pub(crate) lights: Vec<PointLight>,
-    pub(crate) sky: Option<Sky>,
-    pub(crate) finish: Finish,
+    spheres: Vec<(DVec3, f64)>,
+    plane: Option<Plane>,
+    lights: Vec<PointLight>,
+    sky: Option<Sky>,
+    finish: Finish,
     /// How far the checks lie from their place, in sides of a check along x and z.
     pub(crate) check_shift: [f64; 2],
     pub(crate) has_shadows: bool,
+    /// Parts of the checkerboard that light the spheres, where they do.
+    glow: Vec<Patch>,
+}
+
+/// A part of the checkerboard: where it is, and the radiance that leaves it, times its area.
+#[derive(Clone, Copy, Debug)]
+struct Patch {
+    place: DVec3,
+    light: DVec3,
 }
 
 /// What a ray meets.
@@ -166,7 +175,24 @@ impl World {
             finish,
             check_shift: [0.0; 2],
             has_shadows: true,
+            glow: Vec::new(),
         }
+    }
+
+    /// The same where the checkerboard, lit by the lights alone, lights the spheres: one bounce.
+    pub(crate) fn with_bounce(mut self) -> Self {
+        /// Parts across.
+        const PARTS: usize = 80;
+        let Some(plane) = &self.plane else { return self };
+        let side = 2.0 * plane.half_extent / PARTS as f64;
+        let along = |k: usize| (k as f64 + 0.5) * side - plane.half_extent;
+        let patch = |k: usize| {
+            let place = DVec3::new(along(k % PARTS), plane.height, along(k / PARTS));
+            let light = self.checkerboard(&Hit { point: place, normal: DVec3::Y, is_subject: false });
+            Patch { place, light: side * side * light }
+        };
+        self.glow = (0..PARTS * PARTS).map(patch).filter(|patch| patch.light != DVec3::ZERO).collect();
+        self
     }
 
     /// The picture, each pixel the mean of `k` by `k` points.
@@ -201,7 +227,10 @@ impl World {
         let Some(hit) = self.hit(self.view.eye, direction) else { return (self.sky(direction), false) };
         match self.finish {
             _ if !hit.is_subject => (self.checkerboard(&hit), false),
-            Finish::Lambert(albedo) => (DVec3::from(albedo) / PI * self.irradiance(&hit), true),
+            Finish::Lambert(albedo) => {
+                let bounced: DVec3 = self.glow.iter().map(|patch| patch.irradiance(&hit)).sum();
+                (DVec3::from(albedo) / PI * (self.irradiance(&hit) + bounced), true)
+            }
             Finish::Mirror(reflectance) => {
                 let mirrored = direction - 2.0 * direction.dot(hit.normal) * hit.normal;
                 let light = match self.hit(hit.point, mirrored) {
@@ -268,6 +297,15 @@ impl World {
     fn is_shaded(&self, point: DVec3, to: DVec3) -> bool {
         let (direction, length) = (to.normalize(), to.length());
         self.spheres.iter().filter_map(|sphere| distance(sphere, point, direction)).any(|t| t < length)
+    }
+}
+
+impl Patch {
+    /// Irradiance on a sphere, which is in the way of nothing that its surface faces.
+    fn irradiance(&self, hit: &Hit) -> DVec3 {
+        let to = self.place - hit.point;
+        let cosines = hit.normal.dot(to).max(0.0) * -to.y.min(0.0);
+        cosines / to.length_squared().powi(2) * self.light
     }
 }
 

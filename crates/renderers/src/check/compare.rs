@@ -41,6 +41,22 @@ impl Known {
     }
 }
 
+/// Two pictures averaged over squares of pixels that are all chosen, so that noise counts for less; which squares are.
+pub(crate) fn coarse(got: &Image, expected: &Image, chosen: &[bool]) -> (Image, Image, Vec<bool>) {
+    const SIDE: usize = 3;
+    let (width, height) = (got.width() / SIDE, got.height() / SIDE);
+    let within =
+        |x: usize, y: usize| (0..SIDE * SIDE).map(move |k| (SIDE * x + k % SIDE, SIDE * y + k / SIDE));
+    let averaged = |image: &Image| {
+        let share = 1.0 / (SIDE * SIDE) as f32;
+        let sum = |x, y, c: usize| within(x, y).map(|(x, y)| share * image.get(x, y)[c]).sum();
+        Image::from_fn(width, height, |x, y| [sum(x, y, 0), sum(x, y, 1), sum(x, y, 2)])
+    };
+    let squares =
+        (0..width * height).map(|k| within(k % width, k / width).all(|(x, y)| chosen[y * got.width() + x]));
+    (averaged(got), averaged(expected), squares.collect())
+}
+
 /// The share of chosen pixels that are close to what is expected, within a multiple of 1 %.
 pub(crate) fn share_close(got: &Image, expected: &Image, chosen: &[bool], times: f32) -> f64 {
     let dark = DARK * brightest(expected);

@@ -9,6 +9,7 @@ mod determinism;
 mod ending;
 mod finding;
 mod handshake;
+mod interreflection;
 mod lambert;
 mod linearity;
 mod map;
@@ -31,13 +32,14 @@ use crate::{Cause, RendererError};
 use session::Session;
 
 /// All checks, in their order.
-const CHECKS: [Check; 11] = [
+const CHECKS: [Check; 12] = [
     handshake::CHECK,
     lambert::CHECK,
     plane::CHECK,
     camera::CHECK,
     map::MIRROR,
     map::LAMBERT,
+    interreflection::CHECK,
     linearity::CHECK,
     determinism::CHECK,
     noise::CHECK,

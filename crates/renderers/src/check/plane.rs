@@ -62,7 +62,9 @@ fn suspects(scene: &Scene, world: &World, expected: &Image, albedo: [f64; 3], si
     for (check_shift, axis) in shifts {
         let words =
             format!("checks lie half a check off along {axis}: a corner of a check lies at x = z = 0");
-        other(&words, World { check_shift, ..world.clone() });
+        let mut world = world.clone();
+        world.check_shift = check_shift;
+        other(&words, world);
     }
     other("checks are twice as large: check_size is the side of one", changed(&|p| p.check_size *= 2.0));
     other("checks are half as large: check_size is the side of one", changed(&|p| p.check_size /= 2.0));
@@ -73,7 +75,9 @@ fn suspects(scene: &Scene, world: &World, expected: &Image, albedo: [f64; 3], si
         let scene = Scene { plane: None, ..scene.clone() };
         World::new(&scene, None, Finish::Lambert(albedo))
     });
-    other("the ball casts no shadow", World { has_shadows: false, ..world.clone() });
+    let mut unshaded = world.clone();
+    unshaded.has_shadows = false;
+    other("the ball casts no shadow", unshaded);
     let decoded = |c: [f64; 3]| c.map(|a| f64::from(srgb_decode(a as f32)));
     other(
         "the albedos of the checks are taken for sRGB and decoded: they are linear",

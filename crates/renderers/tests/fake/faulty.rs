@@ -110,7 +110,7 @@ impl Worker {
             "protocol": 1, "name": "faulty", "version": "1.0", "licence": "MIT",
             "models": [model(colour("albedo", "diffuse-reflectance")), model(colour("tint", "specular-reflectance"))],
             "capabilities": {"deterministic": "exact", "seeds": true, "noise": true, "samples": "points of a pixel",
-                "lights": ["point", "environment"], "threads": "all", "cancel": false, "interreflection": false},
+                "lights": ["point", "environment"], "threads": "all", "cancel": false, "interreflection": self.has("no-bounce")},
             "check": {"lambert": {"model": "diffuse", "values": {}, "parameter": "albedo"},
                 "mirror": {"model": "specular", "values": {"tint": [1.0, 1.0, 1.0]}}},
             "approximations": blurred,
@@ -201,6 +201,9 @@ impl Worker {
             self.scenes.get(name).ok_or_else(|| format!("scene is '{name}', which is unknown"))?;
         let mut world = World::new(scene, sky.clone(), self.finish);
         world.has_shadows = !self.has("no-shadow");
+        if self.has("bounce") {
+            world = world.with_bounce();
+        }
         if self.has("row-off") {
             world.view.shift = [0.0, 2.0 / *size as f64];
         }
