@@ -86,6 +86,15 @@ fn what_a_renderer_admits_is_no_mistake() {
 }
 
 #[test]
+fn texels_may_be_read_in_two_ways() {
+    let mirror = |mistake| examined(mistake, &["mirror"]).findings.remove(0);
+    let nearest = mirror("nearest");
+    assert_eq!((nearest.outcome, nearest.remarks.len()), (Outcome::Passed, 0), "{nearest:?}");
+    let remarks = mirror("texel-corners").remarks.join("; ");
+    assert!(remarks.contains("rows and columns of the map lie half a texel off"), "{remarks}");
+}
+
+#[test]
 fn mistakes_of_the_protocol_are_named() {
     is_named("accepts-anything", "handshake", "an unknown request is answered with");
     is_named("prints", "handshake", "Loading scene");

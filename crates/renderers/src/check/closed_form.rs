@@ -52,12 +52,24 @@ impl View {
     }
 }
 
+/// How a map is read between its texels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Texels {
+    /// Linearly, between their middles.
+    Linear,
+    /// Each has one colour all over.
+    Nearest,
+    /// Linearly, but so many texels too far right and down.
+    Shifted(f64, f64),
+    /// Linearly, but the middles of the first and of the last row are the poles.
+    Stretched,
+}
+
 /// A latitude-longitude map.
 #[derive(Clone, Debug)]
 pub(crate) struct Sky {
     map: Image,
-    /// Whether a texel's colour fills it, or is interpolated linearly between the middles of texels.
-    is_nearest: bool,
+    texels: Texels,
     /// Directions to patches of the map times their solid angles, and their mean radiance.
     patches: Vec<(DVec3, DVec3)>,
 }
@@ -66,7 +78,7 @@ impl Sky {
     /// Patches of the map, across, that stand for its irradiance.
     const PATCHES: usize = 64;
 
-    pub(crate) fn new(map: Image, is_nearest: bool) -> Self {
+    pub(crate) fn new(map: Image, texels: Texels) -> Self {
         let side = (map.width() / Self::PATCHES).max(1);
         let mut patches = Vec::new();
         for top in (0..map.height()).step_by(side) {
@@ -87,20 +99,23 @@ impl Sky {
             }
         }
         patches.retain(|(_, light)| *light != DVec3::ZERO);
-        Self { map, is_nearest, patches }
+        Self { map, texels, patches }
     }
 
     /// Radiance from a unit direction.
     fn radiance(&self, direction: DVec3) -> DVec3 {
         let (width, height) = (self.map.width(), self.map.height());
-        let u = (direction.x.atan2(-direction.z) / TAU).rem_euclid(1.0) * width as f64;
-        let v = direction.y.clamp(-1.0, 1.0).acos() / PI * height as f64;
+        let mut u = (direction.x.atan2(-direction.z) / TAU).rem_euclid(1.0) * width as f64;
+        let mut v = direction.y.clamp(-1.0, 1.0).acos() / PI * height as f64;
         let texel = |x: f64, y: f64| {
             let column = (x as i64).rem_euclid(width as i64) as usize;
             colour(self.map.get(column, (y.max(0.0) as usize).min(height - 1)))
         };
-        if self.is_nearest {
-            return texel(u.floor(), v.floor());
+        match self.texels {
+            Texels::Linear => (),
+            Texels::Nearest => return texel(u.floor(), v.floor()),
+            Texels::Shifted(right, down) => (u, v) = (u - right, v - down),
+            Texels::Stretched => v = 0.5 + v * (height - 1) as f64 / height as f64,
         }
         let (x, y) = ((u - 0.5).floor(), (v - 0.5).floor());
         let (part_x, part_y) = (u - 0.5 - x, v - 0.5 - y);

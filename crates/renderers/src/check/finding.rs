@@ -102,13 +102,20 @@ pub(crate) fn short(value: f64) -> String {
 }
 
 /// A picture of the worker, the expected one and their difference, side by side.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, PartialEq, Serialize)]
 pub struct Sheet {
     /// What is seen: the name of a file, without its extension.
     pub name: String,
     /// The three pictures, to be looked at: scaled so that the brightest expected pixel is white.
     #[serde(skip)]
     pub image: Image,
+}
+
+impl fmt::Debug for Sheet {
+    /// Without its pixels.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Sheet").field(&self.name).finish()
+    }
 }
 
 /// What a check found.

@@ -2,9 +2,9 @@
 
 use lookmatch_imaging::Image;
 
-use super::closed_form::{Finish, Known, Sky, World};
+use super::closed_form::{Finish, Known, Sky, Texels, World};
 use super::compare::{self, Suspect};
-use super::finding::Limit;
+use super::finding::{Limit, short};
 use super::session::{Session, Worn, ball, marked_map};
 use super::{Check, Finding};
 use crate::{Light, RendererError};
@@ -30,9 +30,9 @@ fn run_mirror(session: &mut Session, finding: &mut Finding) -> Result<(), Render
         return Ok(());
     };
     let got = picture(session, "mirror", &worn)?;
-    let known = |map: Image, is_nearest| known(session, Sky::new(map, is_nearest), Finish::Mirror([1.0; 3]));
-    let linear = known(marked_map(), false);
-    let nearest = known(marked_map(), true);
+    let known = |map: Image, texels| known(session, Sky::new(map, texels), Finish::Mirror([1.0; 3]));
+    let linear = known(marked_map(), Texels::Linear);
+    let nearest = known(marked_map(), Texels::Nearest);
     finding.show("ball", &got, &linear.image);
     let mut is_right = true;
     for (what, takes) in [("ball", (|c| c > 0.999) as fn(f32) -> bool), ("background", |c| c == 0.0)] {
@@ -44,13 +44,39 @@ fn run_mirror(session: &mut Session, finding: &mut Finding) -> Result<(), Render
         let name = format!("median ratio of the {what}");
         if !(finding.measure(name, ratio, Limit::between(0.99, 1.01)) && is_close) {
             is_right = false;
-            name_mistake(&got, &linear.image, &chosen, what, finding, &|map| known(map, false).image);
+            name_mistake(&got, &linear.image, &chosen, what, finding, &|map| known(map, Texels::Linear).image);
         }
     }
     if !is_right {
         excuse(session, finding);
     }
+    name_texels(&got, [&linear, &nearest], finding, &|texels| known(marked_map(), texels).image);
     Ok(())
+}
+
+/// Says where the middles of texels lie, where it is not where they should be. That is too little to be a fault.
+fn name_texels(got: &Image, right: [&Known; 2], finding: &mut Finding, picture: &dyn Fn(Texels) -> Image) {
+    let whole: Vec<bool> = right[0].cover.iter().map(|cover| *cover == 0.0 || *cover > 0.999).collect();
+    let share = |picture: &Image| compare::share_close(got, picture, &whole, 3.0);
+    let honest = share(&right[0].image).max(share(&right[1].image));
+    let words = "a texel off: a corner of a texel is taken for its middle";
+    let others = [
+        (Texels::Stretched, "rows of the map are spread so that the middles of the first and the last are the poles".to_owned()),
+        (Texels::Shifted(0.5, 0.0), format!("columns of the map lie half {words}")),
+        (Texels::Shifted(-0.5, 0.0), format!("columns of the map lie half {words}")),
+        (Texels::Shifted(0.0, 0.5), format!("rows of the map lie half {words}")),
+        (Texels::Shifted(0.0, -0.5), format!("rows of the map lie half {words}")),
+        (Texels::Shifted(0.5, 0.5), format!("rows and columns of the map lie half {words}")),
+        (Texels::Shifted(-0.5, -0.5), format!("rows and columns of the map lie half {words}")),
+    ];
+    let found = others.into_iter().map(|(texels, words)| (share(&picture(texels)), words));
+    if let Some((share, words)) = found.max_by(|a, b| a.0.total_cmp(&b.0))
+        && 1.0 - share < 0.5 * (1.0 - honest)
+        && share > 0.9
+    {
+        let percent = |share: f64| short(100.0 * share);
+        finding.remark(format!("{words} ({} instead of {} % of pixels within 3 %)", percent(share), percent(honest)));
+    }
 }
 
 fn run_lambert(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError> {
@@ -59,7 +85,7 @@ fn run_lambert(session: &mut Session, finding: &mut Finding) -> Result<(), Rende
     }
     let (worn, albedo) = session.lambert([0.5; 3]);
     let got = picture(session, "map", &worn)?;
-    let known = |map: Image| known(session, Sky::new(map, false), Finish::Lambert(albedo));
+    let known = |map: Image| known(session, Sky::new(map, Texels::Linear), Finish::Lambert(albedo));
     let expected = known(marked_map());
     finding.show("ball", &got, &expected.image);
     // Noise of single pixels would hide what is looked for.

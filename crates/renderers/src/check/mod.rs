@@ -139,8 +139,11 @@ pub fn check(
             Err(error) => finding.fault(in_words(&error)),
         }
         // The next check gets a worker that has done nothing wrong yet.
-        if finding.outcome == Outcome::Failed {
-            session.renew()?;
+        let renewed = if finding.outcome == Outcome::Failed { session.renew() } else { Ok(()) };
+        if let Err(error) = renewed {
+            finding.fault(format!("it does not start again: {error}"));
+            note(finding);
+            break;
         }
         note(finding);
     }

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 #[allow(dead_code)]
 mod closed_form;
 
-use closed_form::{Finish, Sky, World};
+use closed_form::{Finish, Sky, Texels, World};
 
 fn main() {
     let mistake = std::env::args().nth(1).unwrap_or_default();
@@ -169,7 +169,12 @@ impl Worker {
             environment: None,
         };
         let width = request["environment"]["width"].as_u64();
-        let sky = width.map(|width| Sky::new(self.map(data, width as usize), false));
+        let texels = match self.mistake.as_str() {
+            "nearest" => Texels::Nearest,
+            "texel-corners" => Texels::Shifted(0.5, 0.5),
+            _ => Texels::Linear,
+        };
+        let sky = width.map(|width| Sky::new(self.map(data, width as usize), texels));
         self.scenes.insert(request["scene"].as_str().unwrap().into(), (size, scene, sky));
     }
 
