@@ -90,8 +90,9 @@ fn texels_may_be_read_in_two_ways() {
     let mirror = |mistake| examined(mistake, &["mirror"]).findings.remove(0);
     let nearest = mirror("nearest");
     assert_eq!((nearest.outcome, nearest.remarks.len()), (Outcome::Passed, 0), "{nearest:?}");
-    let remarks = mirror("texel-corners").remarks.join("; ");
-    assert!(remarks.contains("rows and columns of the map lie half a texel off"), "{remarks}");
+    let corners = mirror("texel-corners");
+    let remarks = corners.remarks.join("; ");
+    assert!(remarks.contains("rows and columns of the map lie half a texel off"), "{corners:?}");
 }
 
 #[test]

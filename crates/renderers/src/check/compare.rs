@@ -28,11 +28,14 @@ fn largest(pixel: [f32; 3]) -> f32 {
 impl Known {
     /// Pixels of even radiance that a choice by the share of the subject in them takes.
     pub(crate) fn smooth(&self, takes: impl Fn(f32) -> bool) -> Vec<bool> {
+        self.even(SMOOTH, takes)
+    }
+
+    /// Those whose radiance differs within by a share of it at most.
+    pub(crate) fn even(&self, most: f32, takes: impl Fn(f32) -> bool) -> Vec<bool> {
         let dark = DARK * brightest(&self.image);
         let pixels = self.image.pixels().iter().zip(&self.spread).zip(&self.cover);
-        pixels
-            .map(|((p, spread), cover)| takes(*cover) && *spread <= SMOOTH * largest(*p).max(dark))
-            .collect()
+        pixels.map(|((p, spread), cover)| takes(*cover) && *spread <= most * largest(*p).max(dark)).collect()
     }
 
     /// Those of the spheres.
