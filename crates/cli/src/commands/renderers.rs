@@ -141,7 +141,7 @@ fn described(finding: &Finding) -> String {
     let is_telling = |number: &&Number| !number.is_within() || finding.outcome != Outcome::Failed;
     let telling = finding.numbers.iter().filter(is_telling).take(3);
     let numbers: Vec<String> = telling.map(Number::to_string).collect();
-    let head = format!("{:<11}  {:<11}  {}", finding.outcome.to_string(), finding.check, numbers.join(", "));
+    let head = format!("{:<11}  {:<11}  {}", finding.outcome.to_string(), finding.check, numbers.join("; "));
     let remarks = finding.remarks.iter().map(|remark| format!("\n             {remark}"));
     format!("{}{}\n", head.trim_end(), remarks.collect::<String>())
 }

@@ -110,8 +110,8 @@ fn mistakes(scene: &Scene, world: &World, expected: &Image, albedo: [f64; 3]) ->
 fn measure(fit: &Fit, fov: f64, size: usize, finding: &mut Finding) {
     let half = size as f64 / 2.0;
     let [right, down] = fit.view.shift.map(|s| s * half);
-    let is_placed = finding.measure("shift to the right, pixels", right, Limit::between(-0.1, 0.1))
-        & finding.measure("shift downwards, pixels", down, Limit::between(-0.1, 0.1));
+    let is_placed = finding.measure("pixels too far right", right, Limit::between(-0.1, 0.1))
+        & finding.measure("pixels too low", down, Limit::between(-0.1, 0.1));
     if !is_placed {
         let words = |shift: f64, positive: &str, negative: &str, kind: &str| {
             let side = if shift > 0.0 { positive } else { negative };
@@ -131,7 +131,7 @@ fn measure(fit: &Fit, fov: f64, size: usize, finding: &mut Finding) {
     }
     let tangent = (fov.to_radians() / 2.0).tan();
     let found = 2.0 * (fit.view.zoom * tangent).atan().to_degrees();
-    if !finding.measure("field of view, degrees", found, Limit::between(0.997 * fov, 1.003 * fov)) {
+    if !finding.measure("degrees of the field of view", found, Limit::between(0.997 * fov, 1.003 * fov)) {
         let known = [
             (2.0 * (tangent / 2.0_f64.sqrt()).atan().to_degrees(), "it is measured over the diagonal"),
             (fov / 2.0, "half of it is used"),
@@ -146,11 +146,11 @@ fn measure(fit: &Fit, fov: f64, size: usize, finding: &mut Finding) {
         finding.remark(format!("the field of view is {} instead of {fov} degrees: {reason}", short(found)));
     }
     let roll = fit.view.roll.to_degrees();
-    if !finding.measure("roll, degrees", roll, Limit::between(-0.3, 0.3)) {
+    if !finding.measure("degrees of roll", roll, Limit::between(-0.3, 0.3)) {
         finding.remark(format!("the picture is turned by {} degrees clockwise", short(roll)));
     }
     let is_explained = fit.residual <= 0.05;
-    finding.measure("what remains, share of the range", fit.residual, Limit::most(0.05));
+    finding.measure("what remains unexplained", fit.residual, Limit::most(0.05));
     if !is_explained && is_placed {
         finding.remark("no place and no orientation of the camera explains the picture");
     }

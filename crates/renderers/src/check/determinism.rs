@@ -14,8 +14,8 @@ pub(super) const CHECK: Check = Check {
     run,
 };
 
-/// How much pictures may differ that are nearly the same, as a share of their range.
-const NEARLY: f64 = 0.01;
+/// How much pictures may differ that are nearly the same: as a share of their range, or of what another seed changes.
+const NEARLY: (f64, f64) = (0.01, 0.5);
 
 fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError> {
     session.load("stage", &session.stage()?)?;
@@ -29,12 +29,14 @@ fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError
     let back = shot(&worn, 1)?;
     let reseeded = shot(&worn, 2)?;
     let range = f64::from(compare::brightest(&first)).max(f64::MIN_POSITIVE);
+    let another = compare::rms(&first, &reseeded) / range;
+    let nearly = NEARLY.0.max(NEARLY.1 * another);
     let differences = [("again", &again), ("after another material", &back)];
     for (when, image) in differences {
         let found = compare::rms(&first, image) / range;
         let (limit, words) = match session.hello.capabilities.deterministic {
             Determinism::Exact => (0.0, "to the bit (capabilities.deterministic is exact)"),
-            Determinism::Approximate => (NEARLY, "nearly (capabilities.deterministic is approximate)"),
+            Determinism::Approximate => (nearly, "nearly (capabilities.deterministic is approximate)"),
             Determinism::None => (f64::INFINITY, ""),
         };
         let limit = if limit.is_finite() { Limit::most(limit) } else { Limit::NONE };
@@ -44,15 +46,14 @@ fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError
         }
     }
     let capabilities = &session.hello.capabilities;
-    let found = compare::rms(&first, &reseeded) / range;
     let random = compare::rms(&first, &again) / range;
     if capabilities.seeds && capabilities.noise {
-        if !finding.measure("difference of another seed", found, Limit::least(f64::MIN_POSITIVE)) {
+        if !finding.measure("difference of another seed", another, Limit::least(1e-6)) {
             finding.remark("another seed gives the same picture: seeds have no effect, although capabilities.seeds is true");
         }
     } else {
-        finding.measure("difference of another seed", found, Limit::NONE);
-        if !capabilities.seeds && random == 0.0 && found > 0.0 {
+        finding.measure("difference of another seed", another, Limit::NONE);
+        if !capabilities.seeds && random == 0.0 && another > 0.0 {
             finding.fault("another seed gives another picture, although capabilities.seeds is false");
         }
     }

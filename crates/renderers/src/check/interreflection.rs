@@ -37,7 +37,7 @@ fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError
     finding.show("ball", &got, &known.image);
     let is_declared = session.hello.capabilities.interreflection;
     let limit = if is_declared { Limit::between(0.92, 1.15) } else { Limit::most(0.01) };
-    if finding.measure("light from the checkerboard, over one bounce of it", ratio, limit) {
+    if finding.measure("light from the checkerboard over one bounce of it", ratio, limit) {
         return Ok(());
     }
     finding.remark(match is_declared {

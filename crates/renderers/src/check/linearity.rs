@@ -59,7 +59,7 @@ fn quotient(more: &Image, less: &Image) -> f64 {
 
 fn ratio(what: &str, strength: f64, more: &Image, less: &Image, finding: &mut Finding) {
     let found = quotient(more, less) / strength;
-    let name = format!("{strength} times the {what}, ratio over {strength}");
+    let name = format!("{strength} times the {what}: ratio over {strength}");
     if !finding.measure(name, found, Limit::between(0.99, 1.01)) {
         finding.remark(match strength > 100.0 {
             true => {

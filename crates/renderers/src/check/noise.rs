@@ -40,8 +40,8 @@ fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError
     finding.measure("samples taken of 16", first.samples.into(), Limit::between(8.0, 32.0));
     finding.measure("samples taken of 64", finer.samples.into(), Limit::between(32.0, 128.0));
     let range = f64::from(compare::brightest(&finer.image)).max(f64::MIN_POSITIVE);
-    finding.measure("noise at 16, share of the range", few / range, Limit::NONE);
-    finding.measure("noise at 64, share of the range", many / range, Limit::NONE);
+    finding.measure("noise at 16 over the range", few / range, Limit::NONE);
+    finding.measure("noise at 64 over the range", many / range, Limit::NONE);
     if !capabilities.noise {
         if few > 1e-3 * range {
             finding.fault("pictures of two seeds differ, although capabilities.noise is false");
@@ -56,7 +56,7 @@ fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError
         );
     }
     let stray = stray(&first.image, &second.image, &finer.image);
-    if !finding.measure("stray pixels, share", stray, Limit::most(0.002)) {
+    if !finding.measure("share of stray pixels", stray, Limit::most(0.002)) {
         finding.remark(
             "single pixels are far too bright (fireflies): light is met by chance that should be aimed at",
         );
