@@ -131,8 +131,10 @@ impl Process {
     pub(crate) fn receive(&self, wait: Duration) -> Option<Event> {
         match self.events.recv_timeout(wait) {
             Ok(event) => Some(event),
-            // Its children may keep the pipe open.
-            Err(RecvTimeoutError::Timeout) if self.has_ended() => Some(Event::Ended),
+            // Its children may keep the pipe open, and its last answer may still be on its way.
+            Err(RecvTimeoutError::Timeout) if self.has_ended() => {
+                Some(self.events.recv_timeout(Duration::from_millis(100)).unwrap_or(Event::Ended))
+            }
             Err(RecvTimeoutError::Timeout) => None,
             Err(RecvTimeoutError::Disconnected) => Some(Event::Ended),
         }

@@ -63,6 +63,14 @@ fn mistakes_of_the_picture_are_named() {
 }
 
 #[test]
+fn turned_pictures_are_put_right_for_other_checks() {
+    let report = examined("flipped-rows", &["camera", "lambert", "plane", "mirror"]);
+    let failed: Vec<&str> =
+        report.findings.iter().filter(|f| f.outcome == Outcome::Failed).map(|f| f.check).collect();
+    assert_eq!(failed, ["camera"]);
+}
+
+#[test]
 fn mistakes_of_the_light_are_named() {
     is_named("light-times-pi", "lambert", "a factor of π");
     is_named("light-times-pi", "plane", "a factor of π");

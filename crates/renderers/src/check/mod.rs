@@ -34,9 +34,10 @@ use session::Session;
 /// All checks, in their order.
 const CHECKS: [Check; 12] = [
     handshake::CHECK,
+    // First of the pictures: it finds out how they are turned.
+    camera::CHECK,
     lambert::CHECK,
     plane::CHECK,
-    camera::CHECK,
     map::MIRROR,
     map::LAMBERT,
     interreflection::CHECK,

@@ -31,9 +31,15 @@ pub(crate) struct Session<'a> {
     pub(crate) models: Vec<&'static Model>,
     /// Why others are not.
     pub(crate) misdescribed: Vec<String>,
+    /// Where each pixel comes from, by its column, its row and the last one, where the camera was found to be turned: other
+    /// checks get pictures that are put right, so that they do not find the same again.
+    pub(crate) turn: Option<Turn>,
     pool: Pool,
     folder: TempDir,
 }
+
+/// A turn of pictures that is its own inverse.
+pub(crate) type Turn = fn(usize, usize, usize) -> (usize, usize);
 
 impl<'a> Session<'a> {
     pub(crate) fn start(
@@ -54,7 +60,7 @@ impl<'a> Session<'a> {
             renderer: hello.name.clone(),
             reason: format!("no folder for maps can be made: {error}"),
         })?;
-        Ok(Self { launch, options, stop, hello, models, misdescribed, pool, folder })
+        Ok(Self { launch, options, stop, hello, models, misdescribed, turn: None, pool, folder })
     }
 
     /// A fresh worker, where the last one was given up.
@@ -103,7 +109,11 @@ impl<'a> Session<'a> {
             samples,
             seed,
         };
-        self.pool.render(&[job]).swap_remove(0)
+        let mut picture = self.pool.render(&[job]).swap_remove(0)?;
+        if let Some(turn) = self.turn {
+            picture.image = turned(&picture.image, turn);
+        }
+        Ok(picture)
     }
 
     /// The Lambert material of an albedo, or of the nearest that it can have.
@@ -159,6 +169,14 @@ impl<'a> Session<'a> {
         }
         Ok(scene)
     }
+}
+
+/// A picture whose pixels come from elsewhere.
+pub(crate) fn turned(image: &Image, turn: Turn) -> Image {
+    Image::from_fn(image.width(), image.height(), |x, y| {
+        let (x, y) = turn(x, y, image.width() - 1);
+        image.get(x, y)
+    })
 }
 
 fn pool_options(options: &CheckOptions) -> PoolOptions {
