@@ -22,7 +22,7 @@ pub(crate) enum Command {
     Eval(EvalArgs),
     /// Render a material in a scene
     Render(RenderArgs),
-    /// List other renderers, install or remove them
+    /// List other renderers, install, remove or check them
     Renderers(RenderersArgs),
     /// Find the probe that maps one model to another
     Remap(RemapArgs),
@@ -74,6 +74,35 @@ pub(crate) enum RenderersCommand {
         #[arg(required = true, value_name = "NAME")]
         names: Vec<String>,
     },
+    /// Say what a renderer gets wrong, with pictures: for authors of workers
+    Check(CheckArgs),
+}
+
+#[derive(Args)]
+pub(crate) struct CheckArgs {
+    /// An installed renderer, or a worker's command line: anything with a space or a path
+    #[arg(value_name = "NAME|COMMAND")]
+    pub(crate) renderer: String,
+    /// Folder for pictures (what came, what was expected, their difference), report.txt and result.json
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Samples per pixel
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(4..))]
+    pub(crate) samples: u32,
+    /// Side of the pictures in pixels
+    #[arg(long, default_value_t = 96, value_parser = clap::value_parser!(u32).range(32..=1024))]
+    pub(crate) size: u32,
+    /// Only these checks, separated by commas
+    #[arg(long, value_name = "CHECK", value_delimiter = ',')]
+    pub(crate) only: Vec<String>,
+    /// Seconds that the worker may stay silent
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) time_limit: u64,
+    /// A file that the worker's own messages are appended to
+    #[arg(long, value_name = "FILE")]
+    pub(crate) log: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) json: Json,
 }
 
 /// How other renderers are run, for commands that name models of theirs: RENDERER:MODEL.

@@ -145,7 +145,7 @@ impl ParameterDescription {
         let wrong = |what: &str| format!("parameter '{}': {what}", self.name);
         let kind = match self.kind {
             KindName::Choice => {
-                if self.options.is_empty() || self.default != Json::from(self.options[0].as_str()) {
+                if self.options.first().is_none_or(|first| self.default.as_str() != Some(first)) {
                     return Err(wrong("a choice has options, the default first"));
                 }
                 Kind::Choice { options: leaked(self.options.iter().map(|o| text(o)).collect()) }

@@ -4,9 +4,12 @@
 //! prints garbage, leaks, renders black), the pool ends it, starts another, repeats the picture once and then reports it
 //! as failed; no other picture is lost by it, and no process is left behind.
 //!
+//! [`check()`] says what a worker gets wrong.
+//!
 //! Those that come with lookmatch ([`BUNDLED`]) are installed by [`Installations`], each in an environment of its own, and
 //! started from there.
 
+mod check;
 mod command;
 mod debian;
 mod error;
@@ -19,6 +22,7 @@ mod registry;
 mod scene;
 mod worker;
 
+pub use check::{CHECK_NAMES, CheckOptions, CheckReport, Finding, Limit, Number, Outcome, Sheet, check};
 pub use error::{Cause, Failure, RendererError};
 pub use hello::{Capabilities, Check, Determinism, Hello, Lambert, Light, Mirror, PROTOCOL, Threads};
 pub use installation::{InstallationError, Installations, State};

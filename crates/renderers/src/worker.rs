@@ -213,6 +213,48 @@ impl Worker {
         self.process.resident() > limit
     }
 
+    /// The answer to a request of any kind; nothing may follow it.
+    pub(crate) fn request(
+        &mut self,
+        body: &Value,
+        stop: Watch<'_>,
+    ) -> Result<Map<String, Value>, RendererError> {
+        let name = body["request"].as_str().unwrap_or_default().to_owned();
+        let answer = self.ask(body, None, 0, stop);
+        answer.map(|(answer, _)| answer).map_err(|unanswered| self.failure(&name, unanswered))
+    }
+
+    /// Starts a render and does not wait for it.
+    pub(crate) fn begin_render(&mut self, scene: &str, samples: u32) {
+        let body = json!({
+            "id": self.requests, "request": "render", "scene": scene, "samples": samples, "seed": 1,
+        });
+        self.requests += 1;
+        self.is_busy = true;
+        self.process.send(format!("{body}\n").into_bytes(), Arc::default(), usize::MAX);
+    }
+
+    /// Closes its input.
+    pub(crate) fn leave(&mut self) {
+        self.process.close_input();
+    }
+
+    /// How it ends, if it does so by itself within a time.
+    pub(crate) fn ending(&mut self, within: Duration) -> Option<String> {
+        self.process.wait(within).then(|| self.process.kill())
+    }
+
+    /// What it printed besides answers, if it did.
+    pub(crate) fn garbage(&mut self) -> Option<String> {
+        loop {
+            match self.process.receive(GLANCE)? {
+                Event::Garbage(what) => return Some(what),
+                Event::Ended => return None,
+                Event::Message(..) => (),
+            }
+        }
+    }
+
     /// Asks it to end, without waiting for that.
     pub(crate) fn dismiss(&mut self) {
         let line = format!("{}\n", json!({ "id": self.requests, "request": "shutdown" }));

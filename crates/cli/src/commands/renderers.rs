@@ -1,20 +1,29 @@
-//! `lookmatch renderers`: which other renderers there are, and their installation.
+//! `lookmatch renderers`: which other renderers there are, their installation, and what a worker gets wrong.
 
+use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use anyhow::Context;
-use lookmatch_renderers::{BUNDLED, Bundled, Installations, Recipe, State};
+use lookmatch_renderers::{
+    BUNDLED, Bundled, CHECK_NAMES, CheckOptions, CheckReport, Finding, Installations, Number, Outcome,
+    Recipe, State, check,
+};
 use serde_json::json;
 
-use crate::args::{RenderersArgs, RenderersCommand};
+use super::create_folder;
+use crate::Usage;
+use crate::args::{CheckArgs, RenderersArgs, RenderersCommand};
 use crate::output::{print, print_json, spinner, table};
-use crate::renderers::interruption;
+use crate::renderers::{interruption, launch, launch_command};
 
 pub(crate) fn run(args: &RenderersArgs) -> anyhow::Result<()> {
     match &args.command {
         None => list(args.json.json),
         Some(RenderersCommand::Install { names }) => install(names),
         Some(RenderersCommand::Remove { names }) => remove(names),
+        Some(RenderersCommand::Check(args)) => check_renderer(args),
     }
 }
 
@@ -87,4 +96,74 @@ fn remove(names: &[String]) -> anyhow::Result<()> {
         eprintln!("{name} {}", if was_there { "is removed" } else { "was not installed" });
     }
     Ok(())
+}
+
+fn check_renderer(args: &CheckArgs) -> anyhow::Result<()> {
+    if let Some(unknown) = args.only.iter().find(|name| !CHECK_NAMES.contains(&name.as_str())) {
+        return Err(Usage(format!("check '{unknown}' is unknown; use {}", CHECK_NAMES.join(", "))).into());
+    }
+    let is_command = args.renderer.contains(|c: char| c.is_whitespace() || c == '/' || c == '\\');
+    let launch = if is_command { launch_command(&args.renderer)? } else { launch(&args.renderer, &[])? };
+    if let Some(folder) = &args.output {
+        create_folder(folder)?;
+    }
+    let options = CheckOptions {
+        samples: args.samples,
+        size: args.size as usize,
+        time_limit: Duration::from_secs(args.time_limit),
+        log: args.log.clone(),
+        only: args.only.clone(),
+    };
+    let stopped = interruption()?;
+    let stop = Arc::new(move || stopped.load(Ordering::Relaxed));
+    let progress = spinner(&format!("checking {}", args.renderer));
+    let observe = |finding: &Finding| {
+        if !args.json.json {
+            progress.suspend(|| print(&described(finding)).ok());
+        }
+    };
+    let report = check(&launch, &options, stop, &observe)?;
+    progress.finish_and_clear();
+    if args.json.json {
+        print_json(&report)?;
+    }
+    if let Some(folder) = &args.output {
+        write_check(&report, folder)?;
+    }
+    match (report.count(Outcome::Failed), report.findings.len()) {
+        (0, _) => Ok(()),
+        (failed, all) => anyhow::bail!("{}: {failed} of {all} checks failed", report.renderer),
+    }
+}
+
+/// A line for a check, and what to know of one that found something. All numbers stand in the report.
+fn described(finding: &Finding) -> String {
+    let is_telling = |number: &&Number| !number.is_within() || finding.outcome != Outcome::Failed;
+    let telling = finding.numbers.iter().filter(is_telling).take(3);
+    let numbers: Vec<String> = telling.map(Number::to_string).collect();
+    let head = format!("{:<11}  {:<11}  {}", finding.outcome.to_string(), finding.check, numbers.join("; "));
+    let remarks = finding.remarks.iter().map(|remark| format!("\n             {remark}"));
+    format!("{}{}\n", head.trim_end(), remarks.collect::<String>())
+}
+
+/// Everything that was found, as text, as JSON and as pictures.
+fn write_check(report: &CheckReport, folder: &Path) -> anyhow::Result<()> {
+    let mut text = format!("{}\n", report.renderer);
+    for finding in &report.findings {
+        text += &format!("\n{}: {} ({})\n", finding.check, finding.outcome, finding.about);
+        for line in finding.numbers.iter().map(Number::to_string).chain(finding.remarks.iter().cloned()) {
+            text += &format!("  {line}\n");
+        }
+        for picture in &finding.pictures {
+            text += &format!("  {0}.png: what came, what was expected, the difference\n", picture.name);
+            let path = folder.join(format!("{}.png", picture.name));
+            lookmatch_imaging::write(&path, &picture.image, &[])?;
+        }
+    }
+    let write = |name: &str, content: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, content).with_context(|| format!("cannot write '{}'", path.display()))
+    };
+    write("report.txt", text)?;
+    write("result.json", serde_json::to_string_pretty(report)? + "\n")
 }
