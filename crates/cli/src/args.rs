@@ -307,7 +307,7 @@ pub(crate) struct BenchArgs {
     /// Also measure another renderer at equal error; it is installed on first use
     #[arg(long, value_enum)]
     pub(crate) peer: Option<PeerName>,
-    /// Folder for the peer's installation, instead of the user's cache
+    /// Folder for renderers that the peer is installed in, instead of that of `lookmatch renderers`
     #[arg(long, value_name = "FOLDER", requires = "peer")]
     pub(crate) peer_folder: Option<PathBuf>,
     /// Paths per pixel of each of the two converged pictures that errors are measured against
