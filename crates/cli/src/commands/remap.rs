@@ -7,15 +7,15 @@ use std::time::Instant;
 
 use lookmatch_materials::split_name;
 use lookmatch_remap::{
-    Assignment, Counts, CrossStage, Endpoint, Entry, Event, Noise, Options, Plan, Preset, Probe, RemapError,
-    Sampling, Side, Stage, Strategy, journal_path, losses, remap, remap_across,
+    Assignment, Counts, CrossStage, Endpoint, Event, Options, Plan, Preset, Probe, RemapError, Sampling,
+    Side, Stage, Strategy, journal_path, losses, remap, remap_across,
 };
 use serde::Serialize;
 use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::{check_output, create_folder};
-use crate::output::{bar, loss_table, print_json, score};
+use crate::output::{bar, loss_table, noise_text, print_json};
 use crate::renderers::{Renderers, interruption, renderer_of};
 use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
@@ -148,30 +148,6 @@ fn search_across(
         100.0 * (all - waited) / all
     );
     Ok((probe, costs))
-}
-
-/// What noise leaves unknown, and what failed.
-fn noise_text(probe: &Probe) -> String {
-    let mut text = String::new();
-    let noises: Vec<_> = probe.found().filter_map(|e| e.noise.map(|noise| (e, noise))).collect();
-    if !noises.is_empty() && noises.iter().any(|(_, noise)| noise.nrmsd != [0.0; 3]) {
-        let mean = |value: &dyn Fn(&(&Entry, Noise)) -> [f64; 3]| {
-            noises.iter().map(|n| value(n).iter().sum::<f64>() / 3.0).sum::<f64>() / noises.len() as f64
-        };
-        let open = noises.iter().filter(|(_, noise)| !noise.is_decided).count();
-        text += &format!(
-            "mean NRMSD {}, noise alone {}; {open} of {} matches are as good as a neighbour within noise\n",
-            score(mean(&|(e, _)| e.nrmsd)),
-            score(mean(&|(_, n)| n.nrmsd)),
-            noises.len()
-        );
-    }
-    for entry in &probe.entries {
-        if let Some(reason) = &entry.failed {
-            text += &format!("failed: {:?}: {reason}\n", entry.source);
-        }
-    }
-    text
 }
 
 fn search(plan: &Plan, args: &RemapArgs, stopped: &Arc<AtomicBool>) -> anyhow::Result<Probe> {
