@@ -42,9 +42,13 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         );
     }
     let started = Instant::now();
-    let (probe, costs) = match named.is_empty() {
-        true => (search(&plan, args, &stopped)?, Vec::new()),
-        false => search_across(&plan, args, &renderers, &stopped)?,
+    let (probe, costs, stage) = match named.is_empty() {
+        true => (search(&plan, args, &stopped)?, Vec::new(), None),
+        false => {
+            let stage = cross_stage(&plan, &renderers)?;
+            let (probe, costs) = search_across(&plan, &stage, args, &renderers, &stopped)?;
+            (probe, costs, Some(stage))
+        }
     };
     probe.write(&args.output)?;
     let seconds = started.elapsed().as_secs_f64();
@@ -59,9 +63,13 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
     eprint!("{}", noise_text(&probe));
     let losses = losses(&probe)?;
     eprint!("{}", loss_table(&losses));
-    let validation = match &args.report {
-        Some(folder) if named.is_empty() => Some(report::write(&probe, folder)?),
-        _ => None,
+    let validation = match (&args.report, stage) {
+        (Some(folder), None) => Some(report::write(&probe, folder)?),
+        (Some(folder), Some(stage)) => {
+            report::write_across(&probe, &stage, args.max_samples, folder)?;
+            None
+        }
+        (None, _) => None,
     };
     if args.json.json {
         let summary = json!({
@@ -106,20 +114,25 @@ impl Cost {
     }
 }
 
-/// The search with other renderers, and what they cost.
-fn search_across(
-    plan: &Plan,
-    args: &RemapArgs,
-    renderers: &Renderers,
-    stopped: &Arc<AtomicBool>,
-) -> anyhow::Result<(Probe, Vec<Cost>)> {
+fn cross_stage(plan: &Plan, renderers: &Renderers) -> anyhow::Result<CrossStage> {
     let preparation = Preparation::of("the reference scene");
     let observe = |progress| preparation.observe(progress);
     let stage = CrossStage::cached(plan, &renderers.studios(), &cache(), &observe)?;
     preparation.finish();
+    Ok(stage)
+}
+
+/// The search with other renderers, and what they cost.
+fn search_across(
+    plan: &Plan,
+    stage: &CrossStage,
+    args: &RemapArgs,
+    renderers: &Renderers,
+    stopped: &Arc<AtomicBool>,
+) -> anyhow::Result<(Probe, Vec<Cost>)> {
     let begun = Instant::now();
     let probe = with_progress(plan, args, stopped, &mut |state, observe, stop| {
-        remap_across(plan, &stage, Some(state), observe, stop)
+        remap_across(plan, stage, Some(state), observe, stop)
     })?;
     let all = begun.elapsed().as_secs_f64();
     let counts = stage.counts();

@@ -43,7 +43,8 @@ fn check_models(probe: &Probe) -> anyhow::Result<()> {
     for (side, material) in [("source", &probe.from), ("target", &probe.to)] {
         let model = material.model();
         if let Some(renderer) = model.renderer {
-            let instead = "the NRMSD of its entries (`lookmatch inspect`) and `lookmatch compare` are that renderer's own";
+            let instead =
+                "`lookmatch inspect` has the NRMSD of its entries, `lookmatch compare` renders single ones";
             let wrong = format!(
                 "validate: the probe's {side} is {}, which only {renderer} can render; {instead}",
                 model.name
