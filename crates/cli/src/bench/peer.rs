@@ -29,6 +29,8 @@ use crate::output::spinner;
 pub(crate) const PEER: &str = "mitsuba";
 /// The sampler with the least error for its time, of those that Mitsuba has.
 const SAMPLER: &str = "multijitter";
+/// What it calls the scene.
+const SCENE: &str = "benchmark";
 /// What its log says before the path of the LLVM library.
 const LLVM: &str = "compiles with ";
 /// Our error is a single material's here, so that many more paths per pixel can be paid for.
@@ -158,9 +160,6 @@ impl Worker {
         Ok(self.pool.render(&[job]).swap_remove(0)?)
     }
 }
-
-/// What the peer calls the scene.
-const SCENE: &str = "benchmark";
 
 /// The same function in the peer's terms.
 fn native(material: &Material) -> (&'static str, Json) {

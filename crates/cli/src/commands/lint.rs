@@ -21,10 +21,7 @@ pub(crate) fn run(args: &LintArgs) -> anyhow::Result<()> {
             Usage(format!("pictures of {} pixels cannot be compared; use {SIZES:?}", args.size)).into()
         );
     }
-    [Some(&args.material), args.like.as_ref()]
-        .into_iter()
-        .flatten()
-        .try_for_each(|text| only_ours("lint", text))?;
+    args.like.iter().chain([&args.material]).try_for_each(|text| only_ours("lint", text))?;
     let given = given(&args.material)?;
     let like = args.like.as_deref().map(material).transpose()?;
     let findings = lint(&given);

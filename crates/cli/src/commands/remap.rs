@@ -114,6 +114,7 @@ impl Cost {
     }
 }
 
+/// The reference scene in all renderers that a plan needs.
 fn cross_stage(plan: &Plan, renderers: &Renderers) -> anyhow::Result<CrossStage> {
     let preparation = Preparation::of("the reference scene");
     let observe = |progress| preparation.observe(progress);
