@@ -110,7 +110,7 @@ pub(crate) struct CheckArgs {
 pub(crate) struct RendererArgs {
     /// Start a renderer by a command of your own instead of the installed one; any name will do
     #[arg(long, value_name = "NAME=COMMAND", value_parser = renderer_command)]
-    pub(crate) renderer: Vec<(String, String)>,
+    pub(crate) start: Vec<(String, String)>,
     /// Worker processes per renderer; one where it uses all cores itself, else as many as there are cores
     #[arg(long, value_name = "NUMBER")]
     pub(crate) workers: Option<usize>,
@@ -124,11 +124,13 @@ pub(crate) struct RendererArgs {
 
 #[derive(Args)]
 pub(crate) struct ModelsArgs {
-    /// Only this model, with its presets
+    /// Only this model, with its presets; RENDERER:MODEL for one of another renderer, RENDERER: for all of them
     pub(crate) model: Option<String>,
     /// Print the catalogue as Markdown: docs/models.md
     #[arg(long, conflicts_with_all = ["json", "model"])]
     pub(crate) markdown: bool,
+    #[command(flatten)]
+    pub(crate) renderers: RendererArgs,
     #[command(flatten)]
     pub(crate) json: Json,
 }
@@ -154,18 +156,20 @@ pub(crate) struct RenderArgs {
     /// Side of the picture in pixels
     #[arg(short, long, default_value_t = 300)]
     pub(crate) size: usize,
-    /// Leave the specular lobe out
+    /// Leave the specular lobe out; of RENDERER:MODEL, show what a black body takes away
     #[arg(long)]
     pub(crate) diffuse_only: bool,
-    /// transport (fast, without noise, spheres alone) or path (slow, exact, spheres and meshes)
-    #[arg(long, default_value = "transport")]
-    pub(crate) renderer: String,
-    /// Samples per pixel of the path renderer
+    /// transport (fast, without noise, spheres alone; the default) or path (slow, exact, spheres and meshes)
+    #[arg(long)]
+    pub(crate) renderer: Option<String>,
+    /// Samples per pixel of the path renderer, or of another renderer
     #[arg(long, default_value_t = 256)]
     pub(crate) samples: u32,
-    /// Seed of the path renderer: other seeds give other noise
+    /// Seed of the path renderer, or of another renderer: other seeds give other noise
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) renderers: RendererArgs,
     /// The picture: .exr (linear, exact) or .png (8 bit sRGB)
     #[arg(short, long)]
     pub(crate) output: PathBuf,
@@ -229,7 +233,7 @@ pub(crate) struct RemapArgs {
     pub(crate) max_samples: u32,
     #[command(flatten)]
     pub(crate) renderers: RendererArgs,
-    /// Validate too, and write tables and side-by-side pictures to this folder
+    /// Write tables and side-by-side pictures to this folder, and validate where both models are our own
     #[arg(long, value_name = "FOLDER")]
     pub(crate) report: Option<PathBuf>,
     /// The probe file
@@ -299,6 +303,11 @@ pub(crate) struct CompareArgs {
     /// Side of the pictures in pixels
     #[arg(long, default_value_t = 300)]
     pub(crate) size: usize,
+    /// Samples per pixel of other renderers' pictures, in two halves that tell their noise
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) samples: u32,
+    #[command(flatten)]
+    pub(crate) renderers: RendererArgs,
     /// Folder for the pictures and the numbers
     #[arg(short, long)]
     pub(crate) output: PathBuf,
@@ -337,7 +346,7 @@ pub(crate) struct BenchArgs {
     /// Also measure another renderer at equal error; it is installed on first use
     #[arg(long, value_enum)]
     pub(crate) peer: Option<PeerName>,
-    /// Folder for the peer's installation, instead of the user's cache
+    /// Folder for renderers that the peer is installed in, instead of that of `lookmatch renderers`
     #[arg(long, value_name = "FOLDER", requires = "peer")]
     pub(crate) peer_folder: Option<PathBuf>,
     /// Paths per pixel of each of the two converged pictures that errors are measured against

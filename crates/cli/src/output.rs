@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use lookmatch_remap::{Loss, LossClass};
+use lookmatch_remap::{Entry, Loss, LossClass, Noise, Probe};
 use serde::Serialize;
 
 /// Prints a text. A reader that went away (`| head`) is no error.
@@ -58,6 +58,30 @@ pub(crate) fn loss_table(losses: &[Loss]) -> String {
     if let Some([mean, worst]) = losses.iter().find_map(|loss| loss.nrmsd) {
         text +=
             &format!("  what is bounded or lost: masked NRMSD {mean:.4} on average, {worst:.4} at worst\n");
+    }
+    text
+}
+
+/// What noise leaves unknown, and what failed.
+pub(crate) fn noise_text(probe: &Probe) -> String {
+    let mut text = String::new();
+    let noises: Vec<_> = probe.found().filter_map(|e| e.noise.map(|noise| (e, noise))).collect();
+    if !noises.is_empty() && noises.iter().any(|(_, noise)| noise.nrmsd != [0.0; 3]) {
+        let mean = |value: &dyn Fn(&(&Entry, Noise)) -> [f64; 3]| {
+            noises.iter().map(|n| value(n).iter().sum::<f64>() / 3.0).sum::<f64>() / noises.len() as f64
+        };
+        let open = noises.iter().filter(|(_, noise)| !noise.is_decided).count();
+        text += &format!(
+            "mean NRMSD {}, noise alone {}; {open} of {} matches are as good as a neighbour within noise\n",
+            score(mean(&|(e, _)| e.nrmsd)),
+            score(mean(&|(_, n)| n.nrmsd)),
+            noises.len()
+        );
+    }
+    for entry in &probe.entries {
+        if let Some(reason) = &entry.failed {
+            text += &format!("failed: {:?}: {reason}\n", entry.source);
+        }
     }
     text
 }

@@ -39,7 +39,36 @@ pub(crate) fn renderer_of(text: &str) -> Option<String> {
         None => split_name(text).0.to_owned(),
     };
     let (renderer, _) = name.split_once(':')?;
-    (by_name(renderer).is_err()).then(|| renderer.to_owned())
+    let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    (renderer.chars().all(is_plain) && by_name(renderer).is_err()).then(|| renderer.to_owned())
+}
+
+/// Refuses a material of another renderer, for commands that have to know its formula.
+pub(crate) fn only_ours(command: &str, text: &str) -> anyhow::Result<()> {
+    let Some(renderer) = renderer_of(text) else { return Ok(()) };
+    let ours = "give a material of our own models (`lookmatch models`)";
+    Err(Usage(format!(
+        "{command}: '{text}' is a material of {renderer}, which only {renderer} can render; {ours}"
+    ))
+    .into())
+}
+
+/// A scene as other renderers see it: all of its spheres wear the material.
+pub(crate) fn plain_scene(mut scene: Scene, renderer: &str) -> anyhow::Result<Scene> {
+    if let Some(mesh) = scene.meshes.first() {
+        return Err(Usage(format!(
+            "{renderer} is given scenes of spheres alone; scene '{}' has the mesh '{}'",
+            scene.name, mesh.file
+        ))
+        .into());
+    }
+    if scene.spheres.iter().any(|sphere| sphere.diffuse.is_some()) {
+        eprintln!(
+            "note: the scene's own colours of spheres are left out; {renderer} knows those of the material alone"
+        );
+    }
+    scene.spheres.iter_mut().for_each(|sphere| sphere.diffuse = None);
+    Ok(scene)
 }
 
 /// How a renderer is started: as the user says, or as it was installed.
@@ -85,7 +114,7 @@ impl Renderers {
             if list.iter().any(|hired| hired.name == *name) {
                 continue;
             }
-            let launch = launch(name, &args.renderer)?;
+            let launch = launch(name, &args.start)?;
             let progress = spinner(&format!("starting {name}"));
             let flag = stopped.clone();
             let stop: Stop = Arc::new(move || flag.load(Ordering::Relaxed));
@@ -121,19 +150,38 @@ impl Renderers {
         self.list.iter().map(record).collect()
     }
 
-    /// One picture of a material of theirs.
-    pub(crate) fn picture(
+    /// All models of theirs.
+    pub(crate) fn models(&self) -> anyhow::Result<Vec<&'static Model>> {
+        let of = |hired: &Arc<Hired>| hired.models.iter().map(|m| m.adopt(&hired.name)).collect::<Vec<_>>();
+        Ok(self.list.iter().flat_map(of).collect::<Result<_, _>>()?)
+    }
+
+    /// Pictures of materials of one of them, each with its own seed.
+    pub(crate) fn pictures(
         &self,
-        material: &Material,
         (scene, light, size): (&Scene, Illumination, usize),
-        (samples, seed): (u32, u32),
-    ) -> anyhow::Result<Image> {
+        samples: u32,
+        materials: &[(&Material, u32)],
+    ) -> anyhow::Result<Vec<Image>> {
+        let hired = self.of(materials[0].0)?;
+        hired.set_scene("picture", scene, light, size).map_err(anyhow::Error::msg)?;
+        let shots =
+            materials.iter().map(|&(material, seed)| Shot { scene: "picture", material, samples, seed });
+        let progress = spinner(&format!("rendering with {}", hired.name));
+        let images = hired.render(&shots.collect::<Vec<_>>());
+        progress.finish_and_clear();
+        images.into_iter().collect::<Result<_, _>>().map_err(anyhow::Error::msg)
+    }
+
+    /// Whether pictures of a material of theirs have noise.
+    pub(crate) fn has_noise(&self, material: &Material) -> anyhow::Result<bool> {
+        Ok(self.of(material)?.has_noise())
+    }
+
+    fn of(&self, material: &Material) -> anyhow::Result<&Hired> {
         let name = material.model().renderer.context("the material is not one of another renderer")?;
         let hired = self.list.iter().find(|hired| hired.name == name);
-        let hired = hired.with_context(|| format!("the renderer '{name}' has not been started"))?;
-        hired.set_scene("picture", scene, light, size).map_err(anyhow::Error::msg)?;
-        let shot = Shot { scene: "picture", material, samples, seed };
-        hired.render(&[shot]).swap_remove(0).map_err(anyhow::Error::msg)
+        Ok(hired.with_context(|| format!("the renderer '{name}' has not been started"))?)
     }
 
     /// Seconds that their processors worked, and pictures that had to be repeated.

@@ -4,14 +4,19 @@ use std::path::Path;
 
 use lookmatch_imaging::{Image, error_map, write as write_image, write_atomically};
 use lookmatch_materials::Material;
-use lookmatch_remap::{Baseline, MethodScores, Probe, ValidationReport, Validator, validation_points};
+use lookmatch_remap::{
+    Baseline, CrossStage, MethodScores, Probe, ValidationReport, Validator, validation_points,
+};
+use lookmatch_rendering::Illumination;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::commands::validate::{prepared, with_progress};
-use crate::output::{score, table};
+use crate::output::{bar, score, table};
 
 /// Side of the pictures in pixels.
 const SIZE: usize = 300;
+/// Matches of other renderers that are pictured: every picture is rendered for it.
+const PICTURED_ACROSS: usize = 4;
 /// Where on each source axis the pictured materials lie, as shares of its length.
 const PICTURED: [f64; 2] = [0.2, 0.75];
 
@@ -32,6 +37,31 @@ pub(crate) fn write(probe: &Probe, folder: &Path) -> anyhow::Result<ValidationRe
     eprint!("{text}");
     eprintln!("report in {}", folder.join("index.html").display());
     Ok(validation)
+}
+
+/// Writes `index.html` and the pictures of a probe of other renderers: what its entries say, and some of them side by side.
+pub(crate) fn write_across(
+    probe: &Probe,
+    stage: &CrossStage,
+    samples: u32,
+    folder: &Path,
+) -> anyhow::Result<()> {
+    let mut places = pictured(probe);
+    places.retain(|place| probe.entries[*place].failed.is_none());
+    let last = places.len().saturating_sub(1);
+    let count = places.len().min(PICTURED_ACROSS);
+    let places = (0..count).map(|k| places[k * last / (count - 1).max(1)]);
+    let progress = bar(count, "picturing");
+    let mut strips = Vec::new();
+    for (k, place) in places.enumerate() {
+        strips.push(strip_across(probe, stage, (place, samples), &folder.join(format!("match-{k}.png")))?);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    let text = page_across(probe, &strips).into_string();
+    write_atomically(&folder.join("index.html"), |out| out.write_all(text.as_bytes()))?;
+    eprintln!("report in {}", folder.join("index.html").display());
+    Ok(())
 }
 
 /// The verdict as text: a block per kind of NRMSD, a row per method.
@@ -112,6 +142,24 @@ fn strip(validator: &Validator, place: usize, path: &Path) -> anyhow::Result<Str
     Ok(Strip { file, source, target: targets[0].clone(), columns, scale })
 }
 
+/// Renders source and match of an entry beside each other, and their difference.
+fn strip_across(
+    probe: &Probe,
+    stage: &CrossStage,
+    (place, samples): (usize, u32),
+    path: &Path,
+) -> anyhow::Result<Strip> {
+    let entry = &probe.entries[place];
+    let source = probe.source_material(&entry.source)?;
+    let target = probe.target_material(&source, &entry.target, entry.body)?;
+    let picture = |material| stage.picture(material, Illumination::Environment, samples);
+    let [(a, _), (b, _)] = [picture(&source)?, picture(&target)?];
+    let (error, scale) = error_map(&a, &b, None)?;
+    write_image(path, &Image::beside(&[&a, &b, &error]), &[])?;
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Strip { file, source, target, columns: vec!["source", "match", "error"], scale })
+}
+
 /// One picture above another of the same width.
 fn above(upper: &Image, lower: &Image) -> Image {
     Image::from_fn(upper.width(), upper.height() + lower.height(), |x, y| {
@@ -125,7 +173,8 @@ overflow-x:auto}td,th{padding:.2rem .7rem;text-align:right;border-bottom:1px sol
 tr.probe td{font-weight:600}img{width:100%;image-rendering:auto;display:block}figure{margin:1.5rem 0}\
 .heads{display:flex}.heads span{flex:1;text-align:center;color:#555}code{background:#eee;padding:0 .3em}";
 
-fn page(probe: &Probe, validation: &ValidationReport, strips: &[Strip]) -> Markup {
+/// A document about a probe.
+fn document(probe: &Probe, body: &Markup) -> Markup {
     let title = format!("{} to {}", probe.from.model().title, probe.to.model().title);
     html! {
         (DOCTYPE)
@@ -143,22 +192,84 @@ fn page(probe: &Probe, validation: &ValidationReport, strips: &[Strip]) -> Marku
                     @if probe.metric.mask { " with the radial mask" }
                     "; " (probe.program) ", seed " (probe.seed) "."
                 }
-                h2 { "Under light that the search never saw" }
-                p {
-                    "Scene " code { (validation.scene) } ", environment " code { (validation.environment) } ", "
-                    (validation.points) " source points. NRMSD per channel: lower is better. "
-                    @if validation.probe_is_best { "The probe beats every baseline on the mean masked NRMSD." }
-                    @else { "A baseline beats the probe on the mean masked NRMSD." }
-                }
-                (scores(validation))
-                h2 { "Side by side" }
-                p { "Below each picture, its difference from the source, on one scale." }
-                @for strip in strips {
-                    figure {
-                        div.heads { @for column in &strip.columns { span { (column) } } }
-                        img src=(strip.file) alt=(format!("{} beside {}", strip.source, strip.target));
-                        figcaption { code { (strip.source) } " becomes " code { (strip.target) }
-                            "; brightest difference " (format!("{:.3}", strip.scale)) }
+                (body)
+            }
+        }
+    }
+}
+
+fn page(probe: &Probe, validation: &ValidationReport, strips: &[Strip]) -> Markup {
+    document(
+        probe,
+        &html! {
+            h2 { "Under light that the search never saw" }
+            p {
+                "Scene " code { (validation.scene) } ", environment " code { (validation.environment) } ", "
+                (validation.points) " source points. NRMSD per channel: lower is better. "
+                @if validation.probe_is_best { "The probe beats every baseline on the mean masked NRMSD." }
+                @else { "A baseline beats the probe on the mean masked NRMSD." }
+            }
+            (scores(validation))
+            h2 { "Side by side" }
+            p { "Below each picture, its difference from the source, on one scale." }
+            (figures(strips))
+        },
+    )
+}
+
+fn page_across(probe: &Probe, strips: &[Strip]) -> Markup {
+    document(
+        probe,
+        &html! {
+            h2 { "Matches" }
+            p {
+                @for renderer in &probe.renderers { "Rendered with " (renderer.name) " " (renderer.version) ". " }
+                "NRMSD of the reference scene's picture under its environment, mean of the channels, beside what noise alone \
+                 makes of it. A match is decided where it is clearly better than all others that were compared."
+            }
+            (entries(probe))
+            h2 { "Side by side" }
+            p { "Under the environment of the reference scene." }
+            (figures(strips))
+        },
+    )
+}
+
+fn figures(strips: &[Strip]) -> Markup {
+    html! {
+        @for strip in strips {
+            figure {
+                div.heads { @for column in &strip.columns { span { (column) } } }
+                img src=(strip.file) alt=(format!("{} beside {}", strip.source, strip.target));
+                figcaption { code { (strip.source) } " becomes " code { (strip.target) }
+                    "; brightest difference " (format!("{:.3}", strip.scale)) }
+            }
+        }
+    }
+}
+
+/// What a probe's entries say, a row each.
+fn entries(probe: &Probe) -> Markup {
+    let columns = probe.source_axes.len() + probe.target_axes.len();
+    let mean = |channels: [f64; 3]| score(channels.iter().sum::<f64>() / 3.0);
+    html! {
+        table {
+            tr {
+                @for axis in &probe.source_axes { th { "source " (axis.name) } }
+                @for axis in &probe.target_axes { th { "target " (axis.name) } }
+                @for name in ["NRMSD", "noise alone", "fitness", "decided"] { th { (name) } }
+            }
+            @for entry in &probe.entries {
+                tr {
+                    @for value in &entry.source { td { (value) } }
+                    @if let Some(reason) = &entry.failed {
+                        td colspan=(columns - entry.source.len() + 4) { "failed: " (reason) }
+                    } @else {
+                        @for value in &entry.target { td { (value) } }
+                        td { (mean(entry.nrmsd)) }
+                        td { @if let Some(noise) = entry.noise { (mean(noise.nrmsd)) } }
+                        td { (score(entry.fitness)) @if let Some(noise) = entry.noise { " ± " (score(noise.fitness)) } }
+                        td { @if let Some(noise) = entry.noise { @if noise.is_decided { "yes" } @else { "no" } } }
                     }
                 }
             }

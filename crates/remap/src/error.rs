@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use lookmatch_imaging::ImageError;
-use lookmatch_materials::MaterialError;
+use lookmatch_materials::{Material, MaterialError};
 use lookmatch_rendering::SceneError;
 use lookmatch_search::{LatticeError, SearchError};
 use thiserror::Error;
@@ -73,6 +73,15 @@ pub enum RemapError {
 }
 
 impl RemapError {
+    /// Refuses a material of another renderer: our own would show it black.
+    pub(crate) fn check_ours(material: &Material) -> Result<(), Self> {
+        let model = material.model();
+        match model.renderer {
+            None => Ok(()),
+            Some(renderer) => Err(Self::Option(format!("only {renderer} can render {}", model.name))),
+        }
+    }
+
     /// True where the request itself is wrong, as opposed to its execution.
     pub fn is_usage(&self) -> bool {
         match self {

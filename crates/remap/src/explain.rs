@@ -47,8 +47,9 @@ pub struct Explanation {
 /// that it is meant to look like.
 ///
 /// # Errors
-/// None on the stages of this crate: pictures of one stage can be compared.
+/// A material of another renderer; else none on the stages of this crate: pictures of one stage can be compared.
 pub fn explain(stage: &Stage, given: &Given, like: &Material) -> Result<Explanation, RemapError> {
+    RemapError::check_ours(like)?;
     let trial = Trial { stage, given, like, seen: stage.appearance(like) };
     let unchanged = trial.run(vec![Vec::new()]).pop();
     let single = readings(given);

@@ -59,6 +59,7 @@ pub fn remap(
     observe: &mut dyn FnMut(Event),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Probe, RemapError> {
+    [&plan.from, &plan.to].into_iter().try_for_each(RemapError::check_ours)?;
     run(plan, Own { stage, is_certified: plan.search == "exhaustive" }.into(), state, observe, stop)
 }
 

@@ -105,7 +105,7 @@ impl<'a> Validator<'a> {
     /// Prepares the scene for pictures of `size` × `size` pixels.
     ///
     /// # Errors
-    /// Where the environment map cannot be read.
+    /// Where the environment map cannot be read, or a model is one of another renderer.
     pub fn prepare(probe: &'a Probe, lighting: &Lighting, size: usize) -> Result<Self, RemapError> {
         Self::cached(probe, lighting, size, &TransportCache::off(), &|_| ())
     }
@@ -121,6 +121,7 @@ impl<'a> Validator<'a> {
         cache: &TransportCache,
         observe: Observe,
     ) -> Result<Self, RemapError> {
+        [&probe.from, &probe.to].into_iter().try_for_each(RemapError::check_ours)?;
         let mut scene = Scene::spheres().for_model(probe.from.model()).for_model(probe.to.model());
         if let Some(map) = lighting {
             scene.environment = Some(EnvironmentLight::of(map));

@@ -22,6 +22,7 @@ microfacet alpha; `roughness` of `principled` is its square root. `int_ior` of `
 own default is air). Tangents of spheres run eastwards about the Y axis: Mitsuba's own poles lie on Z, so its spheres are turned.
 
 Traps:
+* The first and last rows of a map lie at the poles, not half a row from them.
 * LLVM 14 is refused by Mitsuba; 15 and 16 end the process in code generation.
 * A spectrum of a BSDF refuses values above 1 unless it is `unbounded`.
 * `principled` leaves out what is 0 when it is loaded, and puts it in when it is set later: then another kernel is compiled, and the same
@@ -109,6 +110,7 @@ def chosen_variant(asked):
     llvm = usable_llvm()
     if llvm is not None:
         os.environ["DRJIT_LIBLLVM_PATH"] = str(llvm)
+        print(f"compiles with {llvm}", file=sys.stderr)
         return "llvm_ad_rgb"
     hint = f"on Debian: apt-get install libllvm19; elsewhere set DRJIT_LIBLLVM_PATH to a libLLVM of version {OLDEST_LLVM} or newer"
     if asked is not None:
@@ -557,10 +559,19 @@ def environment_light(pixels):
     """None for a black map: Mitsuba cannot choose directions from it."""
     if not pixels.any():
         return None
-    # A map needs 3 columns and 2 rows.
-    height, width, _ = pixels.shape
-    pixels = pixels.repeat(-(-2 // height), axis=0).repeat(-(-3 // width), axis=1)
+    # A map needs 3 columns.
+    pixels = with_rows_between(pixels).repeat(-(-3 // pixels.shape[1]), axis=1)
     return {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(pixels, np.float32))}
+
+
+def with_rows_between(pixels):
+    """Mitsuba's first and last rows lie at the poles, those of the protocol half a row from them: with rows between them that are their
+    means, bilinear interpolation is that between the middles of the protocol's rows."""
+    padded = np.concatenate([pixels[:1], pixels, pixels[-1:]])
+    rows = np.empty((2 * len(pixels) + 1, *pixels.shape[1:]), np.float32)
+    rows[0::2] = (padded[:-1] + padded[1:]) / 2
+    rows[1::2] = pixels
+    return rows
 
 
 def lights(description, environment):

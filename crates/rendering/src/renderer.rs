@@ -354,6 +354,14 @@ impl Scene {
         (0..size * size).into_par_iter().map(share).collect()
     }
 
+    /// The radial mask of its spheres in pictures of a size: see [`Renderer::mask`].
+    ///
+    /// # Errors
+    /// A size that no picture has.
+    pub fn mask(&self, size: usize) -> Result<Mask, SceneError> {
+        subject_mask(self, &Film::new(&self.camera, size))
+    }
+
     /// The scene as materials of a model see it: without diffuse colours of the subjects where the model has no diffuse
     /// reflectance.
     pub fn for_model(&self, model: &lookmatch_materials::Model) -> Self {

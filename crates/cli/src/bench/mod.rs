@@ -15,6 +15,7 @@ mod timing;
 use serde::Serialize;
 
 use accuracy::Accuracy;
+use lookmatch_renderers::Launch;
 use lookmatch_rendering::Scene;
 use machine::Machine;
 use peer::PeerReport;
@@ -88,8 +89,8 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Measures everything; `peer` is the renderer to compare with.
-    pub(crate) fn measure(effort: Effort, peer: Option<&peer::Installation>) -> anyhow::Result<Self> {
+    /// Measures everything; `peer` is how the renderer to compare with is started.
+    pub(crate) fn measure(effort: Effort, peer: Option<&Launch>) -> anyhow::Result<Self> {
         let scene = Scene::reference();
         let (stage, preparation) = Stage::prepare(&scene, effort.size)?;
         let timing = Timing::measure(&stage, &effort)?;

@@ -1,17 +1,21 @@
 //! `lookmatch bench`: speed and accuracy on this machine.
 
+use std::path::Path;
+
+use lookmatch_renderers::{Bundled, Installations, Launch};
+
 use crate::args::{BenchArgs, PeerName};
-use crate::bench::peer::Installation;
+use crate::bench::peer::PEER;
 use crate::bench::{Effort, Report, document};
 use crate::commands::check_output;
-use crate::output::{print, print_json};
+use crate::output::{print, print_json, spinner};
 
 pub(crate) fn run(args: &BenchArgs) -> anyhow::Result<()> {
     if let Some(output) = &args.output {
         check_output(output)?;
     }
     let peer = match args.peer {
-        Some(PeerName::Mitsuba) => Some(Installation::find_or_make(args.peer_folder.as_deref())?),
+        Some(PeerName::Mitsuba) => Some(installed(args.peer_folder.as_deref())?),
         None => None,
     };
     let report = Report::measure(effort(args), peer.as_ref())?;
@@ -20,6 +24,17 @@ pub(crate) fn run(args: &BenchArgs) -> anyhow::Result<()> {
         lookmatch_imaging::write_atomically(output, |out| out.write_all(text.as_bytes()))?;
     }
     if args.json.json { print_json(&report) } else { print(&document::plain(&report)) }
+}
+
+/// How the peer is started, which is installed unless it is there.
+fn installed(folder: Option<&Path>) -> anyhow::Result<Launch> {
+    let installations =
+        folder.map_or_else(Installations::of_user, |folder| Ok(Installations::within(folder)))?;
+    let peer = Bundled::find(PEER)?;
+    let progress = spinner(&format!("installing {PEER} (once)"));
+    installations.install(peer, &|what| progress.set_message(format!("{PEER}: {what}")), &|| false)?;
+    progress.finish_and_clear();
+    Ok(installations.launch(peer)?)
 }
 
 fn effort(args: &BenchArgs) -> Effort {

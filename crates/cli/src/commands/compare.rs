@@ -1,39 +1,56 @@
 //! `lookmatch compare`: two materials side by side, with their difference in numbers.
 
-use lookmatch_imaging::{Image, error_map, nrmsd, write};
-use lookmatch_rendering::{Part, Renderer};
+use std::sync::Arc;
+
+use lookmatch_imaging::{Image, Mask, error_map, nrmsd, write};
+use lookmatch_materials::Material;
+use lookmatch_rendering::{Illumination, Part, Renderer, Scene};
 use serde_json::json;
 
 use crate::args::CompareArgs;
 use crate::commands::{create_folder, lit_scene, material};
 use crate::output::{print, print_json, score, spinner, table};
+use crate::renderers::{Renderers, interruption, plain_scene, renderer_of};
 use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
+    let (mut scene, illumination) = lit_scene(&args.scene, &args.light)?;
+    let texts = [&args.source, &args.target];
+    let named: Vec<String> = texts.into_iter().filter_map(|text| renderer_of(text)).collect();
+    if let Some(name) = named.first() {
+        scene = plain_scene(scene, name)?;
+    }
+    // Mistakes in what can be read at once come before renderers are started.
+    texts
+        .into_iter()
+        .filter(|text| renderer_of(text).is_none())
+        .try_for_each(|text| material(text).map(drop))?;
+    scene.check_picture(illumination, args.size)?;
+    // Only other renderers are to end in order; our own work ends at once.
+    let stopped = if named.is_empty() { Arc::default() } else { interruption()? };
+    let renderers = Renderers::start(&named, &args.renderers, &stopped)?;
     let (source, target) = (material(&args.source)?, material(&args.target)?);
-    let (scene, illumination) = lit_scene(&args.scene, &args.light)?;
     let scene = scene.for_model(source.model()).for_model(target.model());
-    let preparation = Preparation::of("the scene");
-    let observe = |progress| preparation.observe(progress);
-    let renderer = Renderer::cached(&scene, illumination, args.size, &cache(), &observe)?;
-    preparation.finish();
-    let progress = spinner("rendering");
-    let (a, b) = (renderer.render(&source, Part::Full), renderer.render(&target, Part::Full));
-    progress.finish_and_clear();
-    let (whole, masked) = (nrmsd(&a, &b, None)?, nrmsd(&a, &b, Some(renderer.mask()))?);
-    let (map, scale) = error_map(&a, &b, None)?;
+    let views = Views { args, scene: &scene, illumination, renderers: &renderers };
+    let [a, b] = views.take([&source, &target])?;
+    let mask = scene.mask(args.size)?;
+    let (whole, masked) = (nrmsd(&a.image, &b.image, None)?, nrmsd(&a.image, &b.image, Some(&mask))?);
+    let [noise, noise_masked] = [floor(&a, &b, None)?, floor(&a, &b, Some(&mask))?];
+    let (map, scale) = error_map(&a.image, &b.image, None)?;
     create_folder(&args.output)?;
     let file = |name: &str| args.output.join(name);
     let notes = |material: &dyn ToString| [("lookmatch:material".to_owned(), material.to_string())];
-    write(&file("source.exr"), &a, &notes(&source))?;
-    write(&file("target.exr"), &b, &notes(&target))?;
-    write(&file("source.png"), &a, &notes(&source))?;
-    write(&file("target.png"), &b, &notes(&target))?;
+    write(&file("source.exr"), &a.image, &notes(&source))?;
+    write(&file("target.exr"), &b.image, &notes(&target))?;
+    write(&file("source.png"), &a.image, &notes(&source))?;
+    write(&file("target.png"), &b.image, &notes(&target))?;
     write(&file("error.png"), &map, &[])?;
-    write(&file("side-by-side.png"), &Image::beside(&[&a, &b, &map]), &[])?;
+    write(&file("side-by-side.png"), &Image::beside(&[&a.image, &b.image, &map]), &[])?;
     let result = json!({
         "source": source, "target": target, "scene": scene.name, "light": args.light, "size": args.size,
         "nrmsd": whole, "nrmsd_masked": masked, "error_scale": scale,
+        "noise_nrmsd": noise, "noise_nrmsd_masked": noise_masked,
+        "renderers": renderers.records(&[source.model(), target.model()]),
     });
     let text = serde_json::to_string_pretty(&result)?;
     lookmatch_imaging::write_atomically(&file("result.json"), |out| out.write_all(text.as_bytes()))?;
@@ -41,8 +58,87 @@ pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
         return print_json(&result);
     }
     let row = |name: &str, v: [f64; 3]| std::iter::once(name.to_owned()).chain(v.map(score)).collect();
-    let header = ["NRMSD", "red", "green", "blue"].map(str::to_owned).to_vec();
-    print(&table(&[header, row("whole image", whole), row("masked", masked)]))?;
+    let mut rows = vec![["NRMSD", "red", "green", "blue"].map(str::to_owned).to_vec()];
+    for (name, value, noise) in [("whole image", whole, noise), ("masked", masked, noise_masked)] {
+        rows.push(row(name, value));
+        rows.extend(noise.map(|noise| row(&format!("{name}, noise alone"), noise)));
+    }
+    print(&table(&rows))?;
     eprintln!("pictures in {} (error map: white is {scale:.3})", args.output.display());
     Ok(())
+}
+
+/// A picture, and what noise makes of it: the error of each pixel, about.
+struct View {
+    image: Image,
+    noise: Option<Image>,
+}
+
+/// How pictures of both materials are taken.
+struct Views<'a> {
+    args: &'a CompareArgs,
+    scene: &'a Scene,
+    illumination: Illumination,
+    renderers: &'a Renderers,
+}
+
+impl Views<'_> {
+    fn take(&self, materials: [&Material; 2]) -> anyhow::Result<[View; 2]> {
+        let is_ours = |material: &&Material| material.model().renderer.is_none();
+        let own = if materials.iter().any(is_ours) { Some(self.prepared()?) } else { None };
+        let view = |material: &Material, seed: u32| match own.as_ref().filter(|_| is_ours(&material)) {
+            Some(own) => Ok(self.here(own, material)),
+            None => self.elsewhere(material, seed),
+        };
+        Ok([view(materials[0], 1)?, view(materials[1], 3)?])
+    }
+
+    fn prepared(&self) -> anyhow::Result<Renderer> {
+        let preparation = Preparation::of("the scene");
+        let observe = |progress| preparation.observe(progress);
+        let renderer = Renderer::cached(self.scene, self.illumination, self.args.size, &cache(), &observe)?;
+        preparation.finish();
+        Ok(renderer)
+    }
+
+    fn here(&self, own: &Renderer, material: &Material) -> View {
+        let progress = spinner("rendering");
+        let image = own.render(material, Part::Full);
+        progress.finish_and_clear();
+        View { image, noise: None }
+    }
+
+    /// The mean of two halves with independent noise, of which half their difference is left; or one without noise.
+    fn elsewhere(&self, material: &Material, seed: u32) -> anyhow::Result<View> {
+        let place = (self.scene, self.illumination, self.args.size);
+        if !self.renderers.has_noise(material)? {
+            let image =
+                self.renderers.pictures(place, self.args.samples, &[(material, seed)])?.swap_remove(0);
+            return Ok(View { image, noise: None });
+        }
+        let halves = [(material, seed), (material, seed + 1)];
+        let mut halves = self.renderers.pictures(place, self.args.samples.div_ceil(2), &halves)?;
+        let (mut noise, mut image) = (halves.swap_remove(1), halves.swap_remove(0));
+        for (a, b) in image.pixels_mut().iter_mut().zip(noise.pixels_mut()) {
+            for (a, b) in a.iter_mut().zip(b) {
+                (*a, *b) = ((*a + *b) / 2.0, (*a - *b) / 2.0);
+            }
+        }
+        Ok(View { image, noise: Some(noise) })
+    }
+}
+
+/// NRMSD that noise alone would make between two pictures of equal materials; `None` where there is no noise.
+fn floor(source: &View, target: &View, mask: Option<&Mask>) -> anyhow::Result<Option<[f64; 3]>> {
+    let noises: Vec<&Image> = [&source.noise, &target.noise].into_iter().flatten().collect();
+    let mut squares = [0.0; 3];
+    for noise in &noises {
+        let mut noisy = source.image.clone();
+        for (pixel, noise) in noisy.pixels_mut().iter_mut().zip(noise.pixels()) {
+            (0..3).for_each(|c| pixel[c] += noise[c]);
+        }
+        let share = nrmsd(&source.image, &noisy, mask)?;
+        (0..3).for_each(|c| squares[c] += share[c] * share[c]);
+    }
+    Ok((!noises.is_empty()).then(|| squares.map(f64::sqrt)))
 }

@@ -7,6 +7,7 @@ use serde_json::{Map, Value as Json, json};
 
 use crate::args::EvalArgs;
 use crate::output::{print, print_json};
+use crate::renderers::only_ours;
 
 #[derive(Deserialize)]
 struct Vectors {
@@ -27,6 +28,8 @@ pub(crate) fn run(args: &EvalArgs) -> anyhow::Result<()> {
     let text = std::fs::read_to_string(&args.vectors).with_context(|| format!("cannot read '{name}'"))?;
     let vectors: Vectors =
         serde_json::from_str(&text).with_context(|| format!("'{name}' is no file of conformance vectors"))?;
+    // A model that is not known has no value; one of another renderer is no formula that could be tested.
+    vectors.brdf.iter().try_for_each(|vector| only_ours("eval", &vector.model))?;
     let values: Vec<Json> = vectors.brdf.iter().map(evaluate).collect();
     if args.json.json {
         return print_json(&json!({ "brdf": values }));

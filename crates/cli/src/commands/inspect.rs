@@ -4,7 +4,7 @@ use lookmatch_remap::{Axis, Entry, Probe, losses};
 use serde_json::json;
 
 use crate::args::InspectArgs;
-use crate::output::{loss_table, print, print_json, score, table};
+use crate::output::{loss_table, noise_text, print, print_json, score, table};
 
 /// Worst points that are listed.
 const WORST: usize = 5;
@@ -27,6 +27,8 @@ fn summary(probe: &Probe) -> serde_json::Value {
         "strategy": probe.strategy, "search": probe.search, "seed": probe.seed, "preset": probe.preset,
         "metric": probe.metric, "scene": probe.scene.name, "size": probe.size,
         "source_axes": probe.source_axes, "target_axes": probe.target_axes.iter().enumerate().map(axis).collect::<Vec<_>>(),
+        "renderers": probe.renderers.iter().map(|r| json!({ "name": r.name, "version": r.version })).collect::<Vec<_>>(),
+        "sampling": probe.sampling, "failed": probe.entries.len() - probe.found().count(),
         "entries": probe.entries.len(), "totals": probe.totals, "mean_fitness": mean(probe, |e| e.fitness),
         "mean_nrmsd": channel_means(probe, |e| e.nrmsd),
         "mean_nrmsd_masked": channel_means(probe, |e| e.nrmsd_masked),
@@ -36,7 +38,7 @@ fn summary(probe: &Probe) -> serde_json::Value {
 }
 
 fn axis_summary(probe: &Probe, k: usize, axis: &Axis) -> serde_json::Value {
-    let found = || probe.entries.iter().map(move |e| e.target[k]);
+    let found = || probe.found().map(move |e| e.target[k]);
     json!({
         "name": axis.name, "levels": axis.len(), "min": axis.value(0), "max": axis.value(axis.len() - 1),
         "found_min": found().fold(f64::INFINITY, f64::min), "found_max": found().fold(f64::NEG_INFINITY, f64::max),
@@ -60,6 +62,16 @@ fn text(probe: &Probe) -> String {
         probe.scene.name,
         probe.size,
     );
+    if let (Some(sampling), [_, ..]) = (probe.sampling, &probe.renderers[..]) {
+        let names = probe.renderers.iter().map(|r| format!("{} {}", r.name, r.version));
+        let names: Vec<String> = names.collect();
+        text += &format!(
+            "rendered with {}, {} to {} samples per pixel\n\n",
+            names.join(" and "),
+            sampling.samples,
+            sampling.most
+        );
+    }
     let header = ["", "levels", "from", "to", "found", "on the edge"].map(str::to_owned).to_vec();
     let mut rows = vec![header];
     for axis in &probe.source_axes {
@@ -91,9 +103,10 @@ fn text(probe: &Probe) -> String {
     );
     let channels = |value: fn(&Entry) -> [f64; 3]| channel_means(probe, value).map(score).join(" / ");
     text += &format!(
-        "mean NRMSD {} (R/G/B), masked {}\n\nworst matches\n",
+        "mean NRMSD {} (R/G/B), masked {}\n{}\nworst matches\n",
         channels(|e| e.nrmsd),
-        channels(|e| e.nrmsd_masked)
+        channels(|e| e.nrmsd_masked),
+        noise_text(probe)
     );
     for entry in worst(probe) {
         let pairs = |axes: &[Axis], values: &[f64]| -> String {
@@ -111,7 +124,7 @@ fn text(probe: &Probe) -> String {
 }
 
 fn mean(probe: &Probe, value: impl Fn(&Entry) -> f64) -> f64 {
-    probe.entries.iter().map(value).sum::<f64>() / probe.entries.len() as f64
+    probe.found().map(value).sum::<f64>() / probe.found().count() as f64
 }
 
 fn channel_means(probe: &Probe, value: impl Fn(&Entry) -> [f64; 3]) -> [f64; 3] {
@@ -119,7 +132,7 @@ fn channel_means(probe: &Probe, value: impl Fn(&Entry) -> [f64; 3]) -> [f64; 3] 
 }
 
 fn worst(probe: &Probe) -> Vec<&Entry> {
-    let mut entries: Vec<&Entry> = probe.entries.iter().collect();
+    let mut entries: Vec<&Entry> = probe.found().collect();
     entries.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
     entries.truncate(WORST);
     entries

@@ -9,6 +9,7 @@ use crate::Usage;
 use crate::args::LintArgs;
 use crate::commands::material;
 use crate::output::{print, print_json, score};
+use crate::renderers::only_ours;
 use crate::transport::{Preparation, cache};
 
 /// Sides of pictures that can be compared: smaller ones show no highlight.
@@ -20,6 +21,7 @@ pub(crate) fn run(args: &LintArgs) -> anyhow::Result<()> {
             Usage(format!("pictures of {} pixels cannot be compared; use {SIZES:?}", args.size)).into()
         );
     }
+    args.like.iter().chain([&args.material]).try_for_each(|text| only_ours("lint", text))?;
     let given = given(&args.material)?;
     let like = args.like.as_deref().map(material).transpose()?;
     let findings = lint(&given);

@@ -5,13 +5,14 @@ use serde_json::json;
 
 use crate::args::ModelsArgs;
 use crate::output::{print, print_json, table};
+use crate::renderers::{Renderers, interruption, renderer_of};
 
 pub(crate) fn run(args: &ModelsArgs) -> anyhow::Result<()> {
     if args.markdown {
         return print(&markdown());
     }
     let models = match &args.model {
-        Some(name) => vec![by_name(name)?],
+        Some(name) => named(args, name)?,
         None => registry().to_vec(),
     };
     if args.json.json {
@@ -28,8 +29,20 @@ pub(crate) fn run(args: &ModelsArgs) -> anyhow::Result<()> {
     print(&(all.join("\n") + &presets))
 }
 
+/// The model of a name, or all of another renderer: `mitsuba:`. Other renderers are started, and say themselves what they have.
+fn named(args: &ModelsArgs, name: &str) -> anyhow::Result<Vec<&'static Model>> {
+    let Some(renderer) = renderer_of(name).or(name.strip_suffix(':').map(str::to_owned)) else {
+        return Ok(vec![by_name(name)?]);
+    };
+    let renderers = Renderers::start(&[renderer], &args.renderers, &interruption()?)?;
+    if name.ends_with(':') { renderers.models() } else { Ok(vec![by_name(name)?]) }
+}
+
 fn describe(model: &Model) -> String {
-    let mut text = format!("{}  {}\n  {}\n  {}\n", model.name, model.title, model.summary, model.reference);
+    let mut text = format!("{}  {}\n", model.name, model.title);
+    for line in [model.summary, model.reference].into_iter().filter(|line| !line.is_empty()) {
+        text += &format!("  {line}\n");
+    }
     let rows: Vec<Vec<String>> = model.parameters.iter().map(row).collect();
     for line in table(&rows).lines() {
         text += &format!("    {line}\n");

@@ -17,6 +17,7 @@ use crate::Usage;
 use crate::args::PairsArgs;
 use crate::commands::create_folder;
 use crate::output::{bar, print, print_json, table};
+use crate::renderers::only_ours;
 use crate::transport::{Preparation, cache};
 
 /// All that is known of a run: what decides its outcome, and the pairs that are done.
@@ -51,6 +52,7 @@ fn models(names: &[String]) -> anyhow::Result<Vec<&'static Model>> {
     if names.is_empty() {
         return Ok(registry().iter().copied().filter(|m| m.load.is_none()).collect());
     }
+    names.iter().try_for_each(|name| only_ours("pairs", name))?;
     let models = names.iter().map(|name| by_name(name)).collect::<Result<Vec<_>, _>>()?;
     match models.iter().find(|m| m.load.is_some()) {
         Some(model) => Err(Usage(format!("model '{}' needs a file; leave it out", model.name)).into()),

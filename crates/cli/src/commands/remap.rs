@@ -7,15 +7,15 @@ use std::time::Instant;
 
 use lookmatch_materials::split_name;
 use lookmatch_remap::{
-    Assignment, Counts, CrossStage, Endpoint, Entry, Event, Noise, Options, Plan, Preset, Probe, RemapError,
-    Sampling, Side, Stage, Strategy, journal_path, losses, remap, remap_across,
+    Assignment, Counts, CrossStage, Endpoint, Event, Options, Plan, Preset, Probe, RemapError, Sampling,
+    Side, Stage, Strategy, journal_path, losses, remap, remap_across,
 };
 use serde::Serialize;
 use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::{check_output, create_folder};
-use crate::output::{bar, loss_table, print_json, score};
+use crate::output::{bar, loss_table, noise_text, print_json};
 use crate::renderers::{Renderers, interruption, renderer_of};
 use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
@@ -42,9 +42,13 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         );
     }
     let started = Instant::now();
-    let (probe, costs) = match named.is_empty() {
-        true => (search(&plan, args, &stopped)?, Vec::new()),
-        false => search_across(&plan, args, &renderers, &stopped)?,
+    let (probe, costs, stage) = match named.is_empty() {
+        true => (search(&plan, args, &stopped)?, Vec::new(), None),
+        false => {
+            let stage = cross_stage(&plan, &renderers)?;
+            let (probe, costs) = search_across(&plan, &stage, args, &renderers, &stopped)?;
+            (probe, costs, Some(stage))
+        }
     };
     probe.write(&args.output)?;
     let seconds = started.elapsed().as_secs_f64();
@@ -59,9 +63,13 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
     eprint!("{}", noise_text(&probe));
     let losses = losses(&probe)?;
     eprint!("{}", loss_table(&losses));
-    let validation = match &args.report {
-        Some(folder) if named.is_empty() => Some(report::write(&probe, folder)?),
-        _ => None,
+    let validation = match (&args.report, stage) {
+        (Some(folder), None) => Some(report::write(&probe, folder)?),
+        (Some(folder), Some(stage)) => {
+            report::write_across(&probe, &stage, args.max_samples, folder)?;
+            None
+        }
+        (None, _) => None,
     };
     if args.json.json {
         let summary = json!({
@@ -106,20 +114,26 @@ impl Cost {
     }
 }
 
-/// The search with other renderers, and what they cost.
-fn search_across(
-    plan: &Plan,
-    args: &RemapArgs,
-    renderers: &Renderers,
-    stopped: &Arc<AtomicBool>,
-) -> anyhow::Result<(Probe, Vec<Cost>)> {
+/// The reference scene in all renderers that a plan needs.
+fn cross_stage(plan: &Plan, renderers: &Renderers) -> anyhow::Result<CrossStage> {
     let preparation = Preparation::of("the reference scene");
     let observe = |progress| preparation.observe(progress);
     let stage = CrossStage::cached(plan, &renderers.studios(), &cache(), &observe)?;
     preparation.finish();
+    Ok(stage)
+}
+
+/// The search with other renderers, and what they cost.
+fn search_across(
+    plan: &Plan,
+    stage: &CrossStage,
+    args: &RemapArgs,
+    renderers: &Renderers,
+    stopped: &Arc<AtomicBool>,
+) -> anyhow::Result<(Probe, Vec<Cost>)> {
     let begun = Instant::now();
     let probe = with_progress(plan, args, stopped, &mut |state, observe, stop| {
-        remap_across(plan, &stage, Some(state), observe, stop)
+        remap_across(plan, stage, Some(state), observe, stop)
     })?;
     let all = begun.elapsed().as_secs_f64();
     let counts = stage.counts();
@@ -148,30 +162,6 @@ fn search_across(
         100.0 * (all - waited) / all
     );
     Ok((probe, costs))
-}
-
-/// What noise leaves unknown, and what failed.
-fn noise_text(probe: &Probe) -> String {
-    let mut text = String::new();
-    let noises: Vec<_> = probe.found().filter_map(|e| e.noise.map(|noise| (e, noise))).collect();
-    if !noises.is_empty() && noises.iter().any(|(_, noise)| noise.nrmsd != [0.0; 3]) {
-        let mean = |value: &dyn Fn(&(&Entry, Noise)) -> [f64; 3]| {
-            noises.iter().map(|n| value(n).iter().sum::<f64>() / 3.0).sum::<f64>() / noises.len() as f64
-        };
-        let open = noises.iter().filter(|(_, noise)| !noise.is_decided).count();
-        text += &format!(
-            "mean NRMSD {}, noise alone {}; {open} of {} matches are as good as a neighbour within noise\n",
-            score(mean(&|(e, _)| e.nrmsd)),
-            score(mean(&|(_, n)| n.nrmsd)),
-            noises.len()
-        );
-    }
-    for entry in &probe.entries {
-        if let Some(reason) = &entry.failed {
-            text += &format!("failed: {:?}: {reason}\n", entry.source);
-        }
-    }
-    text
 }
 
 fn search(plan: &Plan, args: &RemapArgs, stopped: &Arc<AtomicBool>) -> anyhow::Result<Probe> {

@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use lookmatch_imaging::write;
+use lookmatch_imaging::{Image, write};
+use lookmatch_materials::{BlackBody, Material};
 use lookmatch_rendering::{Part, RENDERERS, RendererEntry};
 use serde_json::json;
 
@@ -10,10 +11,18 @@ use crate::Usage;
 use crate::args::RenderArgs;
 use crate::commands::{check_picture, lit_scene, material};
 use crate::output::{bar, print_json};
+use crate::renderers::{Renderers, interruption, plain_scene, renderer_of};
 use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
-    let entry = renderer(&args.renderer)?;
+    match renderer_of(&args.material) {
+        Some(name) => run_elsewhere(args, name),
+        None => run_here(args),
+    }
+}
+
+fn run_here(args: &RenderArgs) -> anyhow::Result<()> {
+    let entry = renderer(args.renderer.as_deref().unwrap_or(RENDERERS[0].name))?;
     let material = material(&args.material)?;
     let (scene, illumination) = lit_scene(&args.scene, &args.light)?;
     check_picture(&args.output)?;
@@ -43,6 +52,68 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
         return print_json(&summary);
     }
     Ok(())
+}
+
+/// A picture by another renderer, the one that the material names.
+fn run_elsewhere(args: &RenderArgs, name: String) -> anyhow::Result<()> {
+    if let Some(ours) = &args.renderer {
+        let wrong = format!("--renderer {ours} is for our own models; {name} renders '{}'", args.material);
+        return Err(Usage(wrong).into());
+    }
+    let seed = u32::try_from(args.seed).ok().filter(|seed| *seed <= i32::MAX as u32);
+    let seed =
+        seed.ok_or_else(|| Usage(format!("--seed is {}; {name} takes 0 to {}", args.seed, i32::MAX)))?;
+    let (scene, illumination) = lit_scene(&args.scene, &args.light)?;
+    let scene = plain_scene(scene, &name)?;
+    scene.check_picture(illumination, args.size)?;
+    check_picture(&args.output)?;
+    let started = Instant::now();
+    let renderers = Renderers::start(&[name], &args.renderers, &interruption()?)?;
+    let material = material(&args.material)?;
+    let take = |materials: &[&Material]| {
+        let shots: Vec<_> = materials.iter().map(|material| (*material, seed)).collect();
+        renderers.pictures((&scene, illumination, args.size), args.samples, &shots)
+    };
+    let image = match args.diffuse_only {
+        true => body_alone(&material, take)?,
+        false => take(&[&material])?.swap_remove(0),
+    };
+    let (name, usage) = renderers.usage().swap_remove(0);
+    let version = renderers.records(&[]).swap_remove(0).version;
+    let notes = [
+        ("lookmatch:material".to_owned(), material.to_string()),
+        ("lookmatch:renderer".to_owned(), format!("{name} {version}")),
+    ];
+    write(&args.output, &image, &notes)?;
+    let seconds = started.elapsed().as_secs_f64();
+    eprintln!("{} in {seconds:.1} s by {name} {version}", args.output.display());
+    if args.json.json {
+        let summary = json!({
+            "output": args.output, "scene": scene.name, "light": args.light, "size": args.size,
+            "part": if args.diffuse_only { "diffuse" } else { "full" }, "material": material,
+            "renderer": name, "version": version, "seed": seed, "seconds": seconds, "cpu_s": usage.cpu_s,
+            // As many as it took: some round.
+            "samples": usage.pixel_samples / usage.pictures.max(1) / (args.size * args.size) as u64,
+        });
+        return print_json(&summary);
+    }
+    Ok(())
+}
+
+/// What a black body takes away, under the same noise.
+fn body_alone(
+    material: &Material,
+    take: impl FnOnce(&[&Material]) -> anyhow::Result<Vec<Image>>,
+) -> anyhow::Result<Image> {
+    let BlackBody { coloured, black, share } = material.blackened().ok_or_else(|| {
+        Usage(format!("{material} has no diffuse reflection that --diffuse-only could show"))
+    })?;
+    let mut images = take(&[&coloured, &black])?;
+    let (black, mut image) = (images.swap_remove(1), images.swap_remove(0));
+    for (pixel, black) in image.pixels_mut().iter_mut().zip(black.pixels()) {
+        (0..3).for_each(|c| pixel[c] = share as f32 * (pixel[c] - black[c]));
+    }
+    Ok(image)
 }
 
 fn renderer(name: &str) -> anyhow::Result<&'static RendererEntry> {

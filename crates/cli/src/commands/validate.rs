@@ -14,6 +14,7 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
         return Err(Usage("--points is 0; give 1 or more".into()).into());
     }
     let probe = Probe::read(&args.probe)?;
+    check_models(&probe)?;
     if let Some(output) = &args.output {
         check_output(output)?;
     }
@@ -35,6 +36,23 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     }
     let text: Vec<String> = reports.iter().map(scores_table).collect();
     print(&text.join("\n"))
+}
+
+/// Refuses probes of models that we cannot render.
+fn check_models(probe: &Probe) -> anyhow::Result<()> {
+    for (side, material) in [("source", &probe.from), ("target", &probe.to)] {
+        let model = material.model();
+        if let Some(renderer) = model.renderer {
+            let instead =
+                "`lookmatch inspect` has the NRMSD of its entries, `lookmatch compare` renders single ones";
+            let wrong = format!(
+                "validate: the probe's {side} is {}, which only {renderer} can render; {instead}",
+                model.name
+            );
+            return Err(Usage(wrong).into());
+        }
+    }
+    Ok(())
 }
 
 /// Prepares the validation scene under a light, with a sign of life where it takes time.

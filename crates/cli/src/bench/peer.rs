@@ -6,25 +6,33 @@
 //! for ever, is reported too, as the least that can be said. Of the peer's error only its noise is counted, as seen between
 //! two pictures; of ours all that separates it from converged pictures, their noise included.
 
-mod installation;
-mod worker;
+use std::path::Path;
+use std::sync::Arc;
 
+use anyhow::Context;
 use indicatif::ProgressBar;
 use lookmatch_imaging::{Image, delta_e76, lab_from_linear_srgb};
-use lookmatch_materials::Material;
+use lookmatch_materials::{Material, Role};
+use lookmatch_renderers::{Job, Launch, Picture, Pool, PoolOptions};
 use lookmatch_rendering::Illumination;
 use serde::Serialize;
-
-pub(crate) use installation::Installation;
-use installation::LLVM_HINT;
+use serde_json::{Value as Json, json};
+use tempfile::TempDir;
 
 use super::accuracy::{Difference, Truth, ours};
 use super::materials::{Named, shared};
 use super::timing::PictureCost;
 use super::{Effort, Stage};
 use crate::output::spinner;
-use worker::{Cost, Picture, SAMPLER, Worker};
 
+/// The renderer, by the name that it is installed by.
+pub(crate) const PEER: &str = "mitsuba";
+/// The sampler with the least error for its time, of those that Mitsuba has.
+const SAMPLER: &str = "multijitter";
+/// What it calls the scene.
+const SCENE: &str = "benchmark";
+/// What its log says before the path of the LLVM library.
+const LLVM: &str = "compiles with ";
 /// Our error is a single material's here, so that many more paths per pixel can be paid for.
 const MORE_PATHS: u32 = 8;
 
@@ -89,14 +97,12 @@ pub(crate) struct Run {
 
 impl PeerReport {
     /// Measures the peer and our errors for the same pictures.
-    pub(crate) fn measure(
-        installation: &Installation,
-        stage: &Stage,
-        effort: &Effort,
-    ) -> anyhow::Result<Self> {
+    pub(crate) fn measure(launch: &Launch, stage: &Stage, effort: &Effort) -> anyhow::Result<Self> {
         let progress = spinner("Mitsuba: choosing a variant");
         let materials = shared()?;
-        let mut studio = Studio { installation, stage, effort, variant: SLOW };
+        let folder = TempDir::with_prefix("lookmatch-peer-").context("cannot create a temporary folder")?;
+        let log = folder.path().join("log");
+        let mut studio = Studio { launch, stage, effort, log: &log, variant: SLOW };
         let (variants, version) = studio.variants(&materials[0].material, &progress)?;
         let fastest = variants.iter().min_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
         studio.variant = fastest.map_or(SLOW, |v| v.name);
@@ -110,7 +116,7 @@ impl PeerReport {
             name: "Mitsuba 3",
             version,
             sampler: SAMPLER,
-            llvm: installation.llvm.as_ref().map(|path| path.display().to_string()),
+            llvm: llvm(&log),
             // Each measurement takes two.
             images: 2 * (variants.len() + comparisons.iter().map(|c| c.runs.len()).sum::<usize>()),
             variants,
@@ -131,15 +137,66 @@ const FAST: &str = "llvm_ad_rgb";
 
 /// The peer at work.
 struct Studio<'a> {
-    installation: &'a Installation,
+    launch: &'a Launch,
     stage: &'a Stage,
     effort: &'a Effort,
+    /// What its workers say.
+    log: &'a Path,
     variant: &'static str,
+}
+
+/// A variant of the peer with the scene under its environment, and a material in its terms.
+struct Worker {
+    pool: Pool,
+    model: &'static str,
+    values: Json,
+}
+
+impl Worker {
+    /// Renders a picture with some number of samples per pixel.
+    fn render(&self, samples: u32, seed: u32) -> anyhow::Result<Picture> {
+        let values = self.values.as_object().cloned().unwrap_or_default();
+        let job = Job { scene: SCENE.into(), model: self.model.into(), values, samples, seed };
+        Ok(self.pool.render(&[job]).swap_remove(0)?)
+    }
+}
+
+/// The same function in the peer's terms.
+fn native(material: &Material) -> (&'static str, Json) {
+    let ours = material.to_json();
+    let (alpha, white) = (&ours["roughness_u"], [1.0; 3]);
+    match material.by_role(Role::DiffuseReflectance) {
+        Some(_) => (
+            "plastic",
+            json!({
+                "distribution": "ggx", "diffuse": ours["diffuse"], "ior": ours["ior"], "alpha": alpha, "specular": white,
+            }),
+        ),
+        None => (
+            "roughconductor",
+            json!({
+                "distribution": "ggx", "alpha": alpha, "eta": ours["eta"], "k": ours["k"], "specular_reflectance": white,
+            }),
+        ),
+    }
+}
+
+/// The LLVM library that a log names.
+fn llvm(log: &Path) -> Option<String> {
+    let text = std::fs::read(log).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).ok()?;
+    text.lines().find_map(|line| Some(line.split_once(LLVM)?.1.to_owned()))
 }
 
 impl Studio<'_> {
     fn worker(&self, variant: &str, material: &Material) -> anyhow::Result<Worker> {
-        Worker::start(self.installation, variant, (&self.stage.scene, self.effort.size), material)
+        let mut launch = self.launch.clone();
+        launch.args.extend(["--variant", variant, "--sampler", SAMPLER].map(Into::into));
+        let options = PoolOptions { log: Some(self.log.to_owned()), ..PoolOptions::default() };
+        // Where the user ends the benchmark, its workers end with it.
+        let pool = Pool::start(launch, options, Arc::new(|| false))?;
+        pool.scene(SCENE, &self.stage.scene, Illumination::Environment, self.effort.size)?;
+        let (model, values) = native(material);
+        Ok(Worker { pool, model, values })
     }
 
     /// Times the variants; also the peer's version.
@@ -149,31 +206,29 @@ impl Studio<'_> {
         progress: &ProgressBar,
     ) -> anyhow::Result<(Vec<Variant>, String)> {
         let time = |name| {
-            let mut worker = self.worker(name, material)?;
-            let Run { samples, cpu_s, .. } = self.run(&mut worker, self.effort.peer_samples[0])?.1;
-            anyhow::Ok((Variant { name, samples, cpu_s }, worker.version.clone()))
+            let worker = self.worker(name, material)?;
+            let Run { samples, cpu_s, .. } = self.run(&worker, self.effort.peer_samples[0])?.1;
+            anyhow::Ok((Variant { name, samples, cpu_s }, worker.pool.hello().version.clone()))
         };
         let (slow, version) = time(SLOW)?;
         let mut variants = vec![slow];
-        if self.installation.llvm.is_some() {
-            match time(FAST) {
-                Ok((fast, _)) => variants.push(fast),
-                // A library that cannot be used must not end the comparison.
-                Err(error) => progress.suspend(|| {
-                    eprintln!("note: Mitsuba's {FAST} is left out ({LLVM_HINT}): {error}");
-                }),
-            }
+        match time(FAST) {
+            Ok((fast, _)) => variants.push(fast),
+            // A library that is missing or cannot be used must not end the comparison.
+            Err(error) => progress.suspend(|| {
+                eprintln!("note: Mitsuba's {FAST}, which is several times faster, is left out: {error}");
+            }),
         }
         Ok((variants, version))
     }
 
     fn compare(&self, Named { name, material }: Named) -> anyhow::Result<Comparison> {
-        let mut worker = self.worker(self.variant, &material)?;
+        let worker = self.worker(self.variant, &material)?;
         let mut runs = Vec::new();
         for samples in self.effort.peer_samples {
-            runs.push(self.run(&mut worker, samples)?.1);
+            runs.push(self.run(&worker, samples)?.1);
         }
-        let (converged, last) = self.run(&mut worker, self.effort.peer_converged)?;
+        let (converged, last) = self.run(&worker, self.effort.peer_converged)?;
         runs.push(last);
         let [bias, ours] = differences(self.stage, self.effort, &material, &converged)?;
         let cost = PictureCost::measure(self.stage, self.effort, &material)?;
@@ -184,9 +239,9 @@ impl Studio<'_> {
     }
 
     /// Two pictures that differ in their seeds, the lesser time, and their noise.
-    fn run(&self, worker: &mut Worker, samples: u32) -> anyhow::Result<([Picture; 2], Run)> {
+    fn run(&self, worker: &Worker, samples: u32) -> anyhow::Result<([Picture; 2], Run)> {
         let [a, b] = [worker.render(samples, 1)?, worker.render(samples, 2)?];
-        let Cost { samples, cpu_s, wall_s } = if a.cost.cpu_s < b.cost.cpu_s { a.cost } else { b.cost };
+        let Picture { samples, cpu_s, wall_s, .. } = *if a.cpu_s < b.cpu_s { &a } else { &b };
         let (relative_rmse, mean_delta_e) = noise(&a.image, &b.image, self.stage.environment.subjects());
         Ok(([a, b], Run { samples, cpu_s, wall_s, relative_rmse, mean_delta_e }))
     }
