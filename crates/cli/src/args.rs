@@ -228,9 +228,10 @@ pub(crate) struct RemapArgs {
     /// Samples per pixel of other renderers' pictures
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) samples: u32,
-    /// Samples per pixel up to which they are refined where noise leaves open what is best
-    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..))]
-    pub(crate) max_samples: u32,
+    /// Samples per pixel up to which they are refined where noise leaves open what is best; four times --samples, but with
+    /// --quick no more than these
+    #[arg(long, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) max_samples: Option<u32>,
     #[command(flatten)]
     pub(crate) renderers: RendererArgs,
     /// Write tables and side-by-side pictures to this folder, and validate where both models are our own

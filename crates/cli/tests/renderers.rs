@@ -115,7 +115,7 @@ fn microfacets_travel_between_mitsuba_and_cycles() {
     if !wanted().iter().any(|name| name == "cycles") {
         return;
     }
-    ["mitsuba", "cycles"].map(install);
+    ["mitsuba", "cycles"].into_iter().for_each(install);
     let folder = TempDir::new().unwrap();
     for (theirs, ours) in [("ggx", "GGX"), ("beckmann", "BECKMANN")] {
         let mitsuba =

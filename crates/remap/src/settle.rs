@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 /// Levels to each side of the best that belong to the bowl at first, and in the end.
 const REACH: [u32; 2] = [12, 6];
 /// Candidates per coefficient of the fit.
-const CANDIDATES: usize = 4;
+const CANDIDATES: usize = 3;
 /// The bottom is known when its standard error is less than this many levels.
 const KNOWN: f64 = 0.3;
 /// Lattice points of a bowl that are looked at one by one; of larger ones, only its candidates.
@@ -193,7 +193,7 @@ mod tests {
         let whole = Bounds::full(&lattice);
         let bowl = Bowl::around(&lattice, &vec![1, 27, 26], &whole, round);
         let candidates = bowl.candidates(std::iter::empty());
-        assert_eq!(candidates.len(), 24);
+        assert_eq!(candidates.len(), 18);
         let reach = if round == 0 { 12 } else { 6 };
         assert!(
             candidates.iter().all(|p| p[0] == 1 && p[1].abs_diff(27) <= reach && p[2].abs_diff(26) <= reach)

@@ -47,6 +47,7 @@ if hasattr(os, "fork") and not sys.stdin.isatty() and os.fork() == 0:
 
 import json
 import queue
+import resource
 import threading
 import time
 import traceback
@@ -96,8 +97,8 @@ class Timer:
 
     @staticmethod
     def _now():
-        times = os.times()
-        return times.user + times.system + times.children_user + times.children_system, time.perf_counter()
+        uses = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+        return sum(use.ru_utime + use.ru_stime for use in uses), time.perf_counter()
 
 
 cancelled = threading.Event()

@@ -217,7 +217,10 @@ fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
         mask: args.mask,
         quick: args.quick,
         size: args.size,
-        sampling: Sampling { samples: args.samples, most: args.max_samples.max(args.samples) },
+        sampling: Sampling {
+            samples: args.samples,
+            most: args.max_samples.unwrap_or(args.samples * if args.quick { 1 } else { 4 }).max(args.samples),
+        },
         renderers: Vec::new(),
     }
 }
