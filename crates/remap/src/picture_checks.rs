@@ -1,0 +1,186 @@
+//! What is suspicious about given pictures: told from their background, which no material changes.
+//!
+//! The background of a picture and that of ours show the same checkerboard under the same light. Where one is the other turned
+//! over, times a factor, or raised to a power, the picture was written in another way than is meant.
+
+use lookmatch_imaging::{Image, luminance};
+use lookmatch_materials::Material;
+use lookmatch_rendering::Part;
+use serde::Serialize;
+
+use crate::from_pictures::Pictures;
+use crate::{CrossStage, Plan, RemapError};
+
+/// Something suspicious about a picture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Suspicion {
+    /// Rows in the reverse order fit better.
+    UpsideDown,
+    /// Columns in the reverse order fit better.
+    Mirrored,
+    /// All values lie within 0 and 1, and many at 1.
+    Clipped {
+        /// Share of the values that are 1.
+        share: f64,
+    },
+    /// The background is ours to a power.
+    Curved {
+        /// The power.
+        exponent: f64,
+    },
+    /// The background is ours times a factor.
+    Exposed {
+        /// The factor.
+        factor: f64,
+    },
+    /// The background is another one.
+    Different {
+        /// Root mean square difference to ours, as a share of the mean.
+        share: f64,
+    },
+}
+
+/// What the background of a picture says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PictureCheck {
+    /// `full` or `diffuse`.
+    pub part: &'static str,
+    /// 0 for the point light, 1 for the environment.
+    pub light: usize,
+    /// Root mean square difference of the background to ours, as a share of its mean: noise, another filter, another scene.
+    pub background: Option<f64>,
+    /// What is suspicious.
+    pub suspicions: Vec<Suspicion>,
+}
+
+/// Share of the values that may be exactly 1 by chance.
+const AT_ONE: f64 = 1e-3;
+/// A turned picture that fits so much better is no coincidence.
+const TURNED: f64 = 0.5;
+/// Pixels of a block whose means are compared: single ones are noisy.
+const BLOCK: usize = 4;
+/// Blocks that make a comparison.
+const BLOCKS: usize = 16;
+/// Darker than this share of the mean nothing is compared: noise and the haze of filters rule there.
+const DARK: f64 = 0.02;
+/// Exponents and factors so near to 1 are 1.
+const NEAR_ONE: f64 = 0.03;
+/// Differences above this share of the mean have reasons that are none of those above.
+const LARGE: f64 = 0.15;
+/// A power or a factor explains a difference if it leaves less than this share of it.
+const EXPLAINED: f64 = 0.5;
+
+/// Looks at all pictures of a source.
+///
+/// # Errors
+/// None with a stage that was prepared for the plan.
+pub fn check_pictures(
+    plan: &Plan,
+    stage: &CrossStage,
+    pictures: &Pictures,
+) -> Result<Vec<PictureCheck>, RemapError> {
+    let grey = Material::parse("lambert:diffuse=0.3")?;
+    let ours = [0, 1].map(|light| stage.own().views()[light].render(&grey, Part::Full));
+    let coverage = plan.scene.coverage(plan.size);
+    let mut checks = Vec::new();
+    for (part, images) in [("full", &pictures.full), ("diffuse", &pictures.diffuse)] {
+        for (light, image) in images.iter().enumerate() {
+            if let Some(image) = image {
+                let (background, suspicions) = checked(image, &ours[light], &coverage);
+                checks.push(PictureCheck { part, light, background, suspicions });
+            }
+        }
+    }
+    Ok(checks)
+}
+
+fn checked(image: &Image, ours: &Image, coverage: &[f32]) -> (Option<f64>, Vec<Suspicion>) {
+    let mut suspicions = Vec::new();
+    let values = image.pixels().as_flattened();
+    let share = values.iter().filter(|v| **v == 1.0).count() as f64 / values.len() as f64;
+    if share > AT_ONE && values.iter().all(|v| (0.0..=1.0).contains(v)) {
+        suspicions.push(Suspicion::Clipped { share });
+    }
+    let blocks = |image: &Image| Pairs::of(image, ours, coverage);
+    let pairs = blocks(image);
+    if pairs.0.len() < BLOCKS {
+        return (None, suspicions);
+    }
+    let difference = pairs.difference(1.0, 1.0);
+    // A turned picture may be exposed as well: what matters is the pattern.
+    let pattern = |pairs: &Pairs| pairs.difference(pairs.factor(), 1.0);
+    let as_is = pattern(&pairs);
+    let last = image.width() - 1;
+    let upside_down = Image::from_fn(last + 1, last + 1, |x, y| image.get(x, last - y));
+    let mirrored = Image::from_fn(last + 1, last + 1, |x, y| image.get(last - x, y));
+    let turned = [(upside_down, Suspicion::UpsideDown), (mirrored, Suspicion::Mirrored)];
+    let turned = turned.map(|(image, suspicion)| (pattern(&blocks(&image)), suspicion));
+    let best = turned.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((_, suspicion)) = best.filter(|(difference, _)| *difference < TURNED * as_is && as_is > LARGE) {
+        suspicions.push(suspicion);
+        return (Some(difference), suspicions);
+    }
+    let (factor, exponent) = pairs.power();
+    if (exponent - 1.0).abs() > 2.0 * NEAR_ONE && pairs.difference(factor, exponent) < EXPLAINED * as_is {
+        suspicions.push(Suspicion::Curved { exponent });
+    } else if (pairs.factor() - 1.0).abs() > NEAR_ONE && as_is < EXPLAINED * difference {
+        suspicions.push(Suspicion::Exposed { factor: pairs.factor() });
+    } else if difference > LARGE {
+        suspicions.push(Suspicion::Different { share: difference });
+    }
+    (Some(difference), suspicions)
+}
+
+/// Luminances of blocks of the background: ours, theirs.
+struct Pairs(Vec<[f64; 2]>);
+
+impl Pairs {
+    fn of(image: &Image, ours: &Image, coverage: &[f32]) -> Self {
+        let size = image.width();
+        let mut pairs = Vec::new();
+        for (y, x) in (0..size / BLOCK).flat_map(|y| (0..size / BLOCK).map(move |x| (y * BLOCK, x * BLOCK))) {
+            let pixels = (0..BLOCK * BLOCK).map(|k| (y + k / BLOCK) * size + x + k % BLOCK);
+            if pixels.clone().any(|pixel| coverage[pixel] > 0.0) {
+                continue;
+            }
+            let mean = |image: &Image| {
+                let sum: f32 = pixels.clone().map(|pixel| luminance(image.pixels()[pixel])).sum();
+                f64::from(sum) / (BLOCK * BLOCK) as f64
+            };
+            pairs.push([mean(ours), mean(image)]);
+        }
+        let mean = pairs.iter().map(|[ours, _]| ours).sum::<f64>() / pairs.len().max(1) as f64;
+        pairs.retain(|[ours, _]| *ours > DARK * mean);
+        Self(pairs)
+    }
+
+    /// The factor that fits best: the median of the ratios.
+    fn factor(&self) -> f64 {
+        let mut ratios: Vec<f64> = self.0.iter().map(|[ours, theirs]| theirs / ours).collect();
+        ratios.sort_by(f64::total_cmp);
+        ratios[ratios.len() / 2]
+    }
+
+    /// Factor and exponent of the power law that fits best, by least squares of logarithms.
+    fn power(&self) -> (f64, f64) {
+        let logs: Vec<[f64; 2]> =
+            self.0.iter().filter(|pair| pair[1] > 0.0).map(|pair| pair.map(f64::ln)).collect();
+        let count = logs.len().max(1) as f64;
+        let mean = |k: usize| logs.iter().map(|log| log[k]).sum::<f64>() / count;
+        let (x, y) = (mean(0), mean(1));
+        let spread = logs.iter().map(|log| (log[0] - x).powi(2)).sum::<f64>();
+        let slope = logs.iter().map(|log| (log[0] - x) * (log[1] - y)).sum::<f64>() / spread.max(1e-12);
+        ((y - slope * x).exp(), slope)
+    }
+
+    /// Root mean square of what a law leaves unexplained, as a share of what it foretells on average.
+    fn difference(&self, factor: f64, exponent: f64) -> f64 {
+        let foretold = |ours: f64| factor * ours.powf(exponent);
+        let squares: f64 =
+            self.0.iter().map(|[ours, theirs]| (theirs - foretold(*ours)).powi(2)).sum::<f64>();
+        let count = self.0.len() as f64;
+        let mean = self.0.iter().map(|[ours, _]| foretold(*ours)).sum::<f64>() / count;
+        (squares / count).sqrt() / mean.abs().max(1e-12)
+    }
+}
