@@ -17,7 +17,9 @@ use lru::LruCache;
 use rayon::prelude::*;
 
 use crate::carry::{Body, SourceLook};
+use crate::from_pictures::Pictures;
 use crate::gallery::{Key, Stopped, key};
+use crate::picture_checks::check_pictures;
 use crate::probe::Noise;
 use crate::settle::Bowl;
 use crate::stage::LIGHTS;
@@ -31,6 +33,8 @@ const SCENES: [&str; 2] = ["reference-point", "reference-environment"];
 const FAILED: f64 = 1e9;
 /// Memory for looks, in bytes.
 const CAPACITY: usize = 500 << 20;
+/// Pictures with less noise, as a share of their brightness, have none.
+const CLEAN: f64 = 0.005;
 /// Share of a body's brightness that its measurement may be off by.
 const BODY_TOLERANCE: f64 = 0.005;
 /// Renders of a body that its measurement may take.
@@ -145,21 +149,36 @@ impl CrossStage {
         // Two pictures, one smooth one and what is made of it, of two parts under two lights.
         let bytes = 4 * 4 * 3 * weights.len() * size_of::<f32>();
         let room = NonZeroUsize::new(CAPACITY / bytes.max(1)).unwrap_or(NonZeroUsize::MIN);
-        Ok(Self { own, archives, sampling, weights, around, looks: Mutex::new(LruCache::new(room)), keeps_linear: false })
+        Ok(Self {
+            own,
+            archives,
+            sampling,
+            weights,
+            around,
+            looks: Mutex::new(LruCache::new(room)),
+            keeps_linear: false,
+        })
     }
 
     /// [`CrossStage::cached`] for [`crate::match_pictures`]: keeps the pictures of looks as well as what the metric makes of
-    /// them.
+    /// them. Nothing is smoothed where no noise is seen.
     ///
     /// # Errors
     /// As [`CrossStage::cached`].
     pub fn for_pictures(
         plan: &Plan,
+        pictures: &Pictures,
         studios: &[Arc<dyn Studio>],
         cache: &TransportCache,
         observe: Observe,
     ) -> Result<Self, RemapError> {
-        Ok(Self { keeps_linear: true, ..Self::cached(plan, studios, cache, observe)? })
+        let mut stage = Self { keeps_linear: true, ..Self::cached(plan, studios, cache, observe)? };
+        let checks = check_pictures(plan, &stage, pictures)?;
+        let is_clean = checks.iter().all(|check| check.noise.is_some_and(|noise| noise < CLEAN));
+        if is_clean && plan.to.model().renderer.is_none() {
+            stage.around = Neighbourhoods::none(stage.weights.len());
+        }
+        Ok(stage)
     }
 
     /// What each renderer has cost so far, by name.
@@ -455,12 +474,7 @@ impl CrossMatch<'_> {
 
     /// Renders candidates around the best with more and more samples, until it is known which is the best or the budget ends;
     /// says which it was.
-    fn settled(
-        &mut self,
-        found: Point,
-        problem: &Problem,
-        most: u32,
-    ) -> Result<(Point, bool), RemapError> {
+    fn settled(&mut self, found: Point, problem: &Problem, most: u32) -> Result<(Point, bool), RemapError> {
         let mut samples = self.stage.sampling.samples;
         let mut centre = found;
         for round in 0.. {

@@ -50,6 +50,8 @@ pub struct PictureCheck {
     pub light: usize,
     /// Root mean square difference of the background to ours, as a share of its mean: noise, another filter, another scene.
     pub background: Option<f64>,
+    /// Noise of a pixel of the checkerboard, as a share of its brightness.
+    pub noise: Option<f64>,
     /// What is suspicious.
     pub suspicions: Vec<Suspicion>,
 }
@@ -88,7 +90,8 @@ pub fn check_pictures(
         for (light, image) in images.iter().enumerate() {
             if let Some(image) = image {
                 let (background, suspicions) = checked(image, &ours[light], &coverage);
-                checks.push(PictureCheck { part, light, background, suspicions });
+                let noise = noise(image, &ours[light], &coverage);
+                checks.push(PictureCheck { part, light, background, noise, suspicions });
             }
         }
     }
@@ -117,7 +120,8 @@ fn checked(image: &Image, ours: &Image, coverage: &[f32]) -> (Option<f64>, Vec<S
     let turned = [(upside_down, Suspicion::UpsideDown), (mirrored, Suspicion::Mirrored)];
     let turned = turned.map(|(image, suspicion)| (pattern(&blocks(&image)), suspicion));
     let best = turned.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((_, suspicion)) = best.filter(|(difference, _)| *difference < TURNED * as_is && as_is > LARGE) {
+    if let Some((_, suspicion)) = best.filter(|(difference, _)| *difference < TURNED * as_is && as_is > LARGE)
+    {
         suspicions.push(suspicion);
         return (Some(difference), suspicions);
     }
@@ -130,6 +134,24 @@ fn checked(image: &Image, ours: &Image, coverage: &[f32]) -> (Option<f64>, Vec<S
         suspicions.push(Suspicion::Different { share: difference });
     }
     (Some(difference), suspicions)
+}
+
+/// The noise of a picture's background: how much its ratio to ours jumps from pixel to pixel. The sky, which has none, and the
+/// edges of checks, where filters differ, are the lower and upper parts of all jumps.
+fn noise(image: &Image, ours: &Image, coverage: &[f32]) -> Option<f64> {
+    let light = |image: &Image, pixel: usize| f64::from(luminance(image.pixels()[pixel]));
+    let background: Vec<usize> = (0..coverage.len()).filter(|k| coverage[*k] == 0.0).collect();
+    let mean = background.iter().map(|k| light(ours, *k)).sum::<f64>() / background.len().max(1) as f64;
+    let ratio = |pixel: usize| {
+        let is_seen = coverage[pixel] == 0.0 && light(ours, pixel) > DARK * mean;
+        is_seen.then(|| light(image, pixel) / light(ours, pixel))
+    };
+    let in_rows = background.iter().filter(|k| (*k + 1) % image.width() != 0);
+    let mut jumps: Vec<f64> = in_rows.filter_map(|k| Some((ratio(k + 1)? - ratio(*k)?).abs())).collect();
+    jumps.sort_by(f64::total_cmp);
+    let jump = *jumps.get(jumps.len() * 4 / 5)?;
+    // Four fifths of a normal distribution lie within 1.28 σ, and the difference of two values is √2 times as wide.
+    Some(jump / (1.2816 * std::f64::consts::SQRT_2))
 }
 
 /// Luminances of blocks of the background: ours, theirs.
@@ -182,5 +204,56 @@ impl Pairs {
         let count = self.0.len() as f64;
         let mean = self.0.iter().map(|[ours, _]| foretold(*ours)).sum::<f64>() / count;
         (squares / count).sqrt() / mean.abs().max(1e-12)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: usize = 32;
+
+    /// A floor of checks under a bright sky, brighter to the left, with a subject in the middle.
+    fn picture() -> Image {
+        Image::from_fn(SIZE, SIZE, |x, y| {
+            let check = if (x / 4 + y / 4) % 2 == 0 { 0.2 } else { 0.8 };
+            let value = if y < SIZE / 3 { 1.5 } else { check * (1.0 - x as f32 / 64.0) };
+            [value; 3]
+        })
+    }
+
+    fn suspicions(image: &Image) -> Vec<Suspicion> {
+        let middle = |k: usize| (k % SIZE).abs_diff(SIZE / 2) < 5 && (k / SIZE).abs_diff(SIZE / 2) < 5;
+        let coverage: Vec<f32> = (0..SIZE * SIZE).map(|k| if middle(k) { 1.0 } else { 0.0 }).collect();
+        checked(image, &picture(), &coverage).1
+    }
+
+    fn changed(change: impl Fn(f32) -> f32) -> Image {
+        let mut image = picture();
+        image.pixels_mut().as_flattened_mut().iter_mut().for_each(|v| *v = change(*v));
+        image
+    }
+
+    #[test]
+    fn what_was_done_to_a_picture_is_told_from_its_background() {
+        assert_eq!(suspicions(&picture()), []);
+        assert_eq!(suspicions(&changed(|v| 1.01 * v)), []);
+        let [Suspicion::Exposed { factor }] = suspicions(&changed(|v| 0.25 * v))[..] else { panic!() };
+        assert!((factor - 0.25).abs() < 1e-6);
+        let [Suspicion::Curved { exponent }] = suspicions(&changed(|v| 1.2 * v.powf(0.45)))[..] else {
+            panic!()
+        };
+        assert!((exponent - 0.45).abs() < 1e-3);
+        let [Suspicion::Clipped { share }, ..] = suspicions(&changed(|v| v.min(1.0)))[..] else { panic!() };
+        assert!((share - 0.3125).abs() < 1e-9, "{share}");
+        let turned = |image: Image, x: bool| {
+            let last = SIZE - 1;
+            Image::from_fn(SIZE, SIZE, |i, j| if x { image.get(last - i, j) } else { image.get(i, last - j) })
+        };
+        assert_eq!(suspicions(&turned(picture(), false)), [Suspicion::UpsideDown]);
+        assert_eq!(suspicions(&turned(changed(|v| 3.0 * v), false)), [Suspicion::UpsideDown]);
+        assert_eq!(suspicions(&turned(picture(), true)), [Suspicion::Mirrored]);
+        let other = Image::from_fn(SIZE, SIZE, |x, y| [((x * 7 + y * 13) % 11) as f32 / 10.0; 3]);
+        assert!(matches!(suspicions(&other)[..], [Suspicion::Different { .. }]));
     }
 }

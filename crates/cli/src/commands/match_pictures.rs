@@ -59,7 +59,7 @@ pub(crate) fn run(args: &MatchArgs) -> anyhow::Result<()> {
     let started = Instant::now();
     let preparation = Preparation::of("the reference scene");
     let observe = |progress| preparation.observe(progress);
-    let stage = CrossStage::for_pictures(&plan, &renderers.studios(), &cache(), &observe)?;
+    let stage = CrossStage::for_pictures(&plan, &pictures, &renderers.studios(), &cache(), &observe)?;
     preparation.finish();
     let checks = check_pictures(&plan, &stage, &pictures)?;
     refuse_turned(&checks)?;
@@ -90,7 +90,11 @@ pub(crate) fn run(args: &MatchArgs) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(&result)?;
     write_atomically(&args.output.join("result.json"), |out| out.write_all(text.as_bytes()))?;
     eprint!("{}", summary(&facts, &pictures, &found, &used));
-    eprintln!("{:.1} s; pictures and result.json in {}", started.elapsed().as_secs_f64(), args.output.display());
+    eprintln!(
+        "{:.1} s; pictures and result.json in {}",
+        started.elapsed().as_secs_f64(),
+        args.output.display()
+    );
     match args.json.json {
         true => print_json(&result),
         false => print(&format!("{}\n", found.target)),
@@ -183,7 +187,8 @@ fn colour(value: &Json) -> anyhow::Result<[f64; 3]> {
 
 /// The pictures of a folder, checked against each other.
 fn read_pictures(folder: &Path) -> anyhow::Result<Pictures> {
-    let [full, diffuse] = ["full", "diffuse"].map(|part| LIGHTS.map(|light| picture_path(folder, part, light)));
+    let [full, diffuse] =
+        ["full", "diffuse"].map(|part| LIGHTS.map(|light| picture_path(folder, part, light)));
     let is_there = |paths: &[PathBuf; 2]| [paths[0].is_file(), paths[1].is_file()];
     let (has_full, has_diffuse) = (is_there(&full), is_there(&diffuse));
     if has_full == [false; 2] {
@@ -205,16 +210,23 @@ fn read_pictures(folder: &Path) -> anyhow::Result<Pictures> {
         let one = |k: usize| there[k].then(|| read_picture(&paths[k])).transpose();
         Ok([one(0)?, one(1)?])
     };
-    let pictures =
-        Pictures { full: read_there(&full, has_full)?, diffuse: read_there(&diffuse, has_diffuse)?, albedo: None };
+    let pictures = Pictures {
+        full: read_there(&full, has_full)?,
+        diffuse: read_there(&diffuse, has_diffuse)?,
+        albedo: None,
+    };
     let paths = full.iter().chain(&diffuse);
-    let mut sizes = paths.zip(pictures.full.iter().chain(&pictures.diffuse)).filter_map(|(p, i)| Some((p, i.as_ref()?)));
+    let mut sizes =
+        paths.zip(pictures.full.iter().chain(&pictures.diffuse)).filter_map(|(p, i)| Some((p, i.as_ref()?)));
     if let Some((first, image)) = sizes.next() {
         for (path, other) in sizes {
             if image.width() != other.width() {
                 bail!(
                     "'{}' has {} pixels a side and '{}' {}: all pictures must have one size",
-                    first.display(), image.width(), path.display(), other.width()
+                    first.display(),
+                    image.width(),
+                    path.display(),
+                    other.width()
                 );
             }
         }
@@ -264,7 +276,9 @@ fn refuse_turned(checks: &[PictureCheck]) -> anyhow::Result<()> {
     for check in checks {
         let file = file_of(check);
         if check.suspicions.contains(&Suspicion::UpsideDown) {
-            bail!("{file} is upside down: its checkerboard fits ours with the rows reversed; row 0 is on top");
+            bail!(
+                "{file} is upside down: its checkerboard fits ours with the rows reversed; row 0 is on top"
+            );
         }
         if check.suspicions.contains(&Suspicion::Mirrored) {
             bail!("{file} is mirrored: its checkerboard fits ours with the columns reversed");
@@ -298,7 +312,7 @@ fn warn(check: &PictureCheck) {
 }
 
 fn check_json(check: &PictureCheck) -> Json {
-    json!({"file": file_of(check), "background": check.background, "suspicions": check.suspicions})
+    json!({"file": file_of(check), "background": check.background, "noise": check.noise, "suspicions": check.suspicions})
 }
 
 fn main_light(pictures: &Pictures) -> usize {
@@ -319,11 +333,17 @@ fn used(pictures: &Pictures) -> Vec<String> {
 }
 
 /// Source, match and error map of each light; the answer is what the brightest error stands for.
-fn write_pictures(folder: &Path, pictures: &Pictures, found: &PictureMatch) -> anyhow::Result<BTreeMap<&'static str, f32>> {
+fn write_pictures(
+    folder: &Path,
+    pictures: &Pictures,
+    found: &PictureMatch,
+) -> anyhow::Result<BTreeMap<&'static str, f32>> {
     let notes = [("lookmatch:material".to_owned(), found.target.to_string())];
     let mut scales = BTreeMap::new();
     for (k, light) in LIGHTS.into_iter().enumerate() {
-        let Some((source, target)) = pictures.full[k].as_ref().zip(found.pictures[k].as_ref()) else { continue };
+        let Some((source, target)) = pictures.full[k].as_ref().zip(found.pictures[k].as_ref()) else {
+            continue;
+        };
         let (map, scale) = error_map(source, target, None)?;
         let strip = Image::beside(&[source, target, &map]);
         write(&folder.join(format!("match_{light}.exr")), target, &notes)?;
