@@ -226,7 +226,7 @@ impl<'a> Matching<'a> {
             let level = self.stage.level(&unit[self.pictures.main_light()]);
             albedo = std::array::from_fn(|c| (albedo[c] * wanted[c] / level[c]).clamp(1e-6, 1.0));
         }
-        Ok(albedo.map(|v| if v < 1e-4 { 0.0 } else { v }))
+        Ok(albedo.map(short))
     }
 
     /// True where a candidate's albedo follows from full pictures.
@@ -374,14 +374,14 @@ impl<'a> Round<'a> {
         let target = plan.target_with(&self.source(), &lattice.values(best), body)?;
         let look = stage.look(&target, false, stage.sampling.most)?;
         let gain = self.gain(&look);
-        let albedo = std::array::from_fn(|c| (self.belief.albedo[c] * gain[c]).clamp(0.0, 1.0));
+        let albedo = std::array::from_fn(|c| short((self.belief.albedo[c] * gain[c]).clamp(0.0, 1.0)));
         let mut tint = self.belief.tint;
         if let (Some(wanted), Some(linear), true) = (specular, &look.linear, self.matching.takes_tint) {
             let light = pictures.main_light();
             let (wanted, found) =
                 (stage.level(std::slice::from_ref(&wanted[light])), stage.level(&linear.specular[light]));
             if (0..3).all(|c| wanted[c] > 0.0 && found[c] > 0.0) {
-                tint = hue(std::array::from_fn(|c| tint[c] * wanted[c] / found[c]));
+                tint = hue(std::array::from_fn(|c| tint[c] * wanted[c] / found[c])).map(short);
                 if tint.iter().all(|v| *v > WHITE) {
                     tint = [1.0; 3];
                 }
@@ -389,6 +389,11 @@ impl<'a> Round<'a> {
         }
         Ok(Belief { albedo, tint })
     }
+}
+
+/// Five digits after the point: more are noise, and long to read.
+fn short(value: f64) -> f64 {
+    (value * 1e5).round() / 1e5
 }
 
 fn lambert(albedo: [f64; 3]) -> Result<Material, RemapError> {

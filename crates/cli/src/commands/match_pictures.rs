@@ -376,7 +376,7 @@ fn summary(facts: &Facts, pictures: &Pictures, found: &PictureMatch, used: &[Str
     if let Some(albedo) = found.albedo {
         text += &format!("albedo of the body {}\n", albedo.map(score).join(" "));
     }
-    if let Some(tint) = found.tint {
+    if let Some(tint) = found.tint.filter(|tint| *tint != [1.0; 3]) {
         text += &format!("hue of the highlights {}\n", tint.map(score).join(" "));
     }
     for name in &found.saturated {
