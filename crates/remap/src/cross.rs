@@ -174,7 +174,8 @@ impl CrossStage {
     ) -> Result<Self, RemapError> {
         let mut stage = Self { keeps_linear: true, ..Self::cached(plan, studios, cache, observe)? };
         let checks = check_pictures(plan, &stage, pictures)?;
-        let is_clean = checks.iter().all(|check| check.noise.is_some_and(|noise| noise < CLEAN));
+        let mut noises = checks.iter().filter(|check| check.part == "full").map(|check| check.noise);
+        let is_clean = noises.all(|noise| noise.is_some_and(|noise| noise < CLEAN));
         if is_clean && plan.to.model().renderer.is_none() {
             stage.around = Neighbourhoods::none(stage.weights.len());
         }

@@ -66,8 +66,12 @@ const BLOCK: usize = 4;
 const BLOCKS: usize = 16;
 /// Darker than this share of the mean nothing is compared: noise and the haze of filters rule there.
 const DARK: f64 = 0.02;
-/// Exponents and factors so near to 1 are 1.
-const NEAR_ONE: f64 = 0.03;
+/// Exponents so near to 1 are 1.
+const LINEAR: f64 = 0.06;
+/// Factors so near to 1 are 1: a metal throws some light onto the checkerboard, which our background lacks.
+const UNEXPOSED: f64 = 0.1;
+/// A diffuse picture with a background darker than this share of ours is the difference of two pictures, and has none.
+const SUBTRACTED: f64 = 0.1;
 /// Differences above this share of the mean have reasons that are none of those above.
 const LARGE: f64 = 0.15;
 /// A power or a factor explains a difference if it leaves less than this share of it.
@@ -88,28 +92,32 @@ pub fn check_pictures(
     let mut checks = Vec::new();
     for (part, images) in [("full", &pictures.full), ("diffuse", &pictures.diffuse)] {
         for (light, image) in images.iter().enumerate() {
-            if let Some(image) = image {
-                let (background, suspicions) = checked(image, &ours[light], &coverage);
-                let noise = noise(image, &ours[light], &coverage);
-                checks.push(PictureCheck { part, light, background, noise, suspicions });
+            let Some(image) = image else { continue };
+            let pairs = Pairs::of(image, &ours[light], &coverage);
+            let mut suspicions: Vec<Suspicion> = clipped(image).into_iter().collect();
+            let is_difference = part == "diffuse" && pairs.factor().abs() < SUBTRACTED;
+            let (mut background, mut noise) = (None, None);
+            if pairs.0.len() >= BLOCKS && !is_difference {
+                background = Some(pairs.difference(1.0, 1.0));
+                noise = noise_of(image, &ours[light], &coverage);
+                suspicions.extend(told_by_background(image, &ours[light], &coverage));
             }
+            checks.push(PictureCheck { part, light, background, noise, suspicions });
         }
     }
     Ok(checks)
 }
 
-fn checked(image: &Image, ours: &Image, coverage: &[f32]) -> (Option<f64>, Vec<Suspicion>) {
-    let mut suspicions = Vec::new();
+fn clipped(image: &Image) -> Option<Suspicion> {
     let values = image.pixels().as_flattened();
     let share = values.iter().filter(|v| **v == 1.0).count() as f64 / values.len() as f64;
-    if share > AT_ONE && values.iter().all(|v| (0.0..=1.0).contains(v)) {
-        suspicions.push(Suspicion::Clipped { share });
-    }
+    let is_clipped = share > AT_ONE && values.iter().all(|v| (0.0..=1.0).contains(v));
+    is_clipped.then_some(Suspicion::Clipped { share })
+}
+
+fn told_by_background(image: &Image, ours: &Image, coverage: &[f32]) -> Option<Suspicion> {
     let blocks = |image: &Image| Pairs::of(image, ours, coverage);
     let pairs = blocks(image);
-    if pairs.0.len() < BLOCKS {
-        return (None, suspicions);
-    }
     let difference = pairs.difference(1.0, 1.0);
     // A turned picture may be exposed as well: what matters is the pattern.
     let pattern = |pairs: &Pairs| pairs.difference(pairs.factor(), 1.0);
@@ -120,25 +128,23 @@ fn checked(image: &Image, ours: &Image, coverage: &[f32]) -> (Option<f64>, Vec<S
     let turned = [(upside_down, Suspicion::UpsideDown), (mirrored, Suspicion::Mirrored)];
     let turned = turned.map(|(image, suspicion)| (pattern(&blocks(&image)), suspicion));
     let best = turned.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((_, suspicion)) = best.filter(|(difference, _)| *difference < TURNED * as_is && as_is > LARGE)
-    {
-        suspicions.push(suspicion);
-        return (Some(difference), suspicions);
+    let is_turned = |turned: &(f64, Suspicion)| turned.0 < TURNED * as_is && as_is > LARGE;
+    if let Some((_, suspicion)) = best.filter(is_turned) {
+        return Some(suspicion);
     }
     let (factor, exponent) = pairs.power();
-    if (exponent - 1.0).abs() > 2.0 * NEAR_ONE && pairs.difference(factor, exponent) < EXPLAINED * as_is {
-        suspicions.push(Suspicion::Curved { exponent });
-    } else if (pairs.factor() - 1.0).abs() > NEAR_ONE && as_is < EXPLAINED * difference {
-        suspicions.push(Suspicion::Exposed { factor: pairs.factor() });
-    } else if difference > LARGE {
-        suspicions.push(Suspicion::Different { share: difference });
+    if (exponent - 1.0).abs() > LINEAR && pairs.difference(factor, exponent) < EXPLAINED * as_is {
+        return Some(Suspicion::Curved { exponent });
     }
-    (Some(difference), suspicions)
+    if (pairs.factor() - 1.0).abs() > UNEXPOSED && as_is < EXPLAINED * difference {
+        return Some(Suspicion::Exposed { factor: pairs.factor() });
+    }
+    (difference > LARGE).then_some(Suspicion::Different { share: difference })
 }
 
 /// The noise of a picture's background: how much its ratio to ours jumps from pixel to pixel. The sky, which has none, and the
 /// edges of checks, where filters differ, are the lower and upper parts of all jumps.
-fn noise(image: &Image, ours: &Image, coverage: &[f32]) -> Option<f64> {
+fn noise_of(image: &Image, ours: &Image, coverage: &[f32]) -> Option<f64> {
     let light = |image: &Image, pixel: usize| f64::from(luminance(image.pixels()[pixel]));
     let background: Vec<usize> = (0..coverage.len()).filter(|k| coverage[*k] == 0.0).collect();
     let mean = background.iter().map(|k| light(ours, *k)).sum::<f64>() / background.len().max(1) as f64;
@@ -181,7 +187,7 @@ impl Pairs {
     fn factor(&self) -> f64 {
         let mut ratios: Vec<f64> = self.0.iter().map(|[ours, theirs]| theirs / ours).collect();
         ratios.sort_by(f64::total_cmp);
-        ratios[ratios.len() / 2]
+        ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
     }
 
     /// Factor and exponent of the power law that fits best, by least squares of logarithms.
@@ -225,7 +231,7 @@ mod tests {
     fn suspicions(image: &Image) -> Vec<Suspicion> {
         let middle = |k: usize| (k % SIZE).abs_diff(SIZE / 2) < 5 && (k / SIZE).abs_diff(SIZE / 2) < 5;
         let coverage: Vec<f32> = (0..SIZE * SIZE).map(|k| if middle(k) { 1.0 } else { 0.0 }).collect();
-        checked(image, &picture(), &coverage).1
+        clipped(image).into_iter().chain(told_by_background(image, &picture(), &coverage)).collect()
     }
 
     fn changed(change: impl Fn(f32) -> f32) -> Image {

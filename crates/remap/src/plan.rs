@@ -184,6 +184,9 @@ const SIZES: std::ops::RangeInclusive<usize> = 16..=2048;
 /// Up to here an index of refraction is widened in equal steps: it stands for a reflectance of 0.4.
 const EQUAL_STEPS: f64 = 4.45;
 
+/// η and k of a metal without colour that reflects 0.965 of what falls on it: about as much as silver.
+const BRIGHT_METAL: [f64; 2] = [0.15, 4.0];
+
 /// Step of the scale of a conductor that is to look like something else.
 const SCALE_STEP: f64 = 0.02;
 
@@ -234,6 +237,7 @@ impl Plan {
         let surveyed = if let Endpoint::Model(model) = from { model.surveyed } else { &[] };
         let mut source = Draft::new(from.material(), surveyed, |r| r.survey)?;
         let mut target = Draft::new(to.material(), to.model().searched, |r| r.search)?;
+        let is_named = matches!(to, Endpoint::Named(_));
         let (from, to) = (from.model(), to.model());
         check_names(options, from, to)?;
         for vary in &options.vary {
@@ -247,7 +251,7 @@ impl Plan {
         let from_material = source.fixed.clone().checked()?;
         target.suit(&from_material)?;
         if is_pictured {
-            target.suit_pictures()?;
+            target.suit_pictures(is_named)?;
         }
         if target.axes.is_empty() {
             let why = if to.searched.is_empty() {
@@ -450,9 +454,22 @@ impl Draft {
         Ok(())
     }
 
-    /// Pictures of a metal tell its colour, which no parameter does.
-    fn suit_pictures(&mut self) -> Result<(), RemapError> {
+    /// Pictures of a metal tell its colour, which no parameter does. A conductor starts as bright as any, so that its scale
+    /// reaches all metals.
+    fn suit_pictures(&mut self, is_named: bool) -> Result<(), RemapError> {
         let model = self.fixed.model();
+        if self.fixed.is_conductor() && !is_named {
+            for (role, value) in
+                [(Role::ConductorIndex, BRIGHT_METAL[0]), (Role::Extinction, BRIGHT_METAL[1])]
+            {
+                let is_set = |name: &str| {
+                    self.held.iter().any(|held| *held == name) || self.given.iter().any(|given| given == name)
+                };
+                if !model.parameters.iter().any(|p| p.role == role && is_set(p.name)) {
+                    self.fixed.set_role(role, [value; 3])?;
+                }
+            }
+        }
         let is_metal = self.fixed.by_role(Role::Metalness).is_some_and(|m| m.mean() == Some(1.0));
         let base = model.parameters.iter().find(|p| p.role == Role::BaseColour).filter(|_| is_metal);
         let Some(base) = base else { return Ok(()) };

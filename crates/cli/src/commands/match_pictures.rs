@@ -365,7 +365,12 @@ fn summary(facts: &Facts, pictures: &Pictures, found: &PictureMatch, used: &[Str
         text += &format!("note: no full_{light}.exr: {} alone decides\n", LIGHTS[1 - k]);
     }
     if !pictures.has_diffuse() {
-        text += "note: no diffuse pictures: full pictures were compared, and the body's colour was fitted\n";
+        let body = match (found.albedo, pictures.albedo) {
+            (None, _) => "the target has no body",
+            (Some(_), Some(_)) => "the body's colour is the given one",
+            (Some(_), None) => "the body's colour was fitted",
+        };
+        text += &format!("note: no diffuse pictures: full pictures were compared; {body}\n");
     }
     text += &table(&[
         header,
