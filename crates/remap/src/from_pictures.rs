@@ -43,9 +43,11 @@ pub struct PictureMatch {
     pub fitness: f64,
     /// NRMSD per channel of the full pictures, whole image: without and with the mask.
     pub nrmsd: [[f64; 3]; 2],
+    /// What the noise of the target's picture alone makes of it, without the mask; 0 for our own models.
+    pub noise: [f64; 3],
     /// Full pictures of the target, by light, where the source has one.
     pub pictures: [Option<Image>; 2],
-    /// Albedo of the body, where the target has one.
+    /// Albedo of the body, where the target has one that is not fixed.
     pub albedo: Option<[f64; 3]>,
     /// Hue of the highlights beside those of the target, where it takes one.
     pub tint: Option<[f64; 3]>,
@@ -149,6 +151,8 @@ struct Matching<'a> {
     /// Of equation 3, by part and light; 0 for what is not there.
     weights: [ByLight<f64>; 2],
     has_body: bool,
+    /// True where the body's colour is neither fixed nor searched.
+    is_body_free: bool,
     takes_tint: bool,
     stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -186,6 +190,7 @@ impl<'a> Matching<'a> {
             seen,
             weights: weights(stage.own.part_weights(), pictures),
             has_body,
+            is_body_free: is_body_free(plan)?,
             takes_tint: takes_tint(plan)?,
             stop,
         })
@@ -213,6 +218,9 @@ impl<'a> Matching<'a> {
 
     /// The albedo that is known, that diffuse pictures show, or a guess.
     fn first_albedo(&self) -> Result<[f64; 3], RemapError> {
+        if !self.is_body_free {
+            return Ok(self.plan.to.canonical().body);
+        }
         if let Some(known) = self.pictures.albedo {
             return Ok(known);
         }
@@ -231,7 +239,7 @@ impl<'a> Matching<'a> {
 
     /// True where a candidate's albedo follows from full pictures.
     fn fits_albedo(&self) -> bool {
-        self.has_body && self.pictures.albedo.is_none() && !self.pictures.has_diffuse()
+        self.is_body_free && self.pictures.albedo.is_none() && !self.pictures.has_diffuse()
     }
 
     fn finished(
@@ -253,20 +261,23 @@ impl<'a> Matching<'a> {
             true => stage.weighted_score(&self.seen, &look, true, self.weights),
             false => self.whole_score(&look, None, [1.0; 3]),
         };
-        let mut shown = [None, None];
+        let (mut shown, mut noises) = ([None, None], [None, None]);
         for light in (0..2).filter(|l| pictures.full[*l].is_some()) {
-            shown[light] = Some(stage.picture(&target, LIGHTS[light], samples)?.0);
+            let (picture, noise) = stage.picture(&target, LIGHTS[light], samples)?;
+            (shown[light], noises[light]) = (Some(picture), noise);
         }
         let main = pictures.main_light();
         let (a, b) = pictures.full[main].as_ref().zip(shown[main].as_ref()).ok_or_else(lost)?;
+        let noise = noises[main].as_ref().map_or(Ok([0.0; 3]), |noise| noise_alone(a, noise))?;
         let mask = stage.own.views()[1].mask();
         Ok(PictureMatch {
             nrmsd: [nrmsd(a, b, None)?, nrmsd(a, b, Some(mask))?],
             fitness: fitness.value.max(0.0),
+            noise,
             target,
             values,
             pictures: shown,
-            albedo: self.has_body.then_some(belief.albedo),
+            albedo: self.is_body_free.then_some(belief.albedo),
             tint: (self.takes_tint && self.specular.is_some()).then_some(belief.tint),
             compared,
             saturated: crate::strategy::on_edge(&self.lattice, best),
@@ -418,6 +429,19 @@ fn has_body(target: &Material) -> bool {
     !is_metal && target.model().parameters.iter().any(|parameter| parameter.role.is_body())
 }
 
+/// True where the body takes the colour that pictures show.
+fn is_body_free(plan: &Plan) -> Result<bool, RemapError> {
+    let model = plan.to.model();
+    let mut set = plan.held.clone();
+    for axis in &plan.target_axes {
+        set.extend(
+            model.resolve(&axis.name)?.into_iter().map(|index| model.parameters[index].name.to_owned()),
+        );
+    }
+    let is_free = |name: &str| !set.iter().any(|other| other == name);
+    Ok(has_body(&plan.to) && model.parameters.iter().any(|p| p.role.is_body() && is_free(p.name)))
+}
+
 /// True where a searched colour takes the hue of the highlights.
 fn takes_tint(plan: &Plan) -> Result<bool, RemapError> {
     let is_metal = !has_body(&plan.to);
@@ -448,6 +472,14 @@ fn weights([specular, diffuse]: [ByLight<f64>; 2], pictures: &Pictures) -> [ByLi
         true => [present(specular), present(diffuse)],
         false => [present([0, 1].map(|l| specular[l] + diffuse[l])), [0.0; 2]],
     }
+}
+
+/// NRMSD of a picture and the same with noise added.
+fn noise_alone(picture: &Image, noise: &Image) -> Result<[f64; 3], RemapError> {
+    let mut noisy = picture.clone();
+    let values = noise.pixels().as_flattened();
+    noisy.pixels_mut().as_flattened_mut().iter_mut().zip(values).for_each(|(value, noise)| *value += noise);
+    Ok(nrmsd(picture, &noisy, None)?)
 }
 
 /// A picture's subject pixels; black without one.

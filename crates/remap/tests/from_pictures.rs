@@ -109,6 +109,10 @@ fn one_light_is_enough_and_a_known_body_is_believed() {
     let found = matched(&pictures, "ggx", Vec::new());
     let body = found.target.by_role(lookmatch_materials::Role::DiffuseReflectance).unwrap();
     assert_eq!(body.colour(), Some([0.4, 0.3, 0.2]));
+    // What the user fixes stays, and is not fitted.
+    let plain = self::pictures(text, false);
+    let found = matched(&plain, "ggx", vec![fix("diffuse", "0.5/0.3/0.1")]);
+    assert_eq!((found.albedo, &*found.values), (None, &[1.0, 1.5, 0.3][..]));
 }
 
 #[test]

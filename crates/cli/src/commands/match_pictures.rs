@@ -81,7 +81,7 @@ pub(crate) fn run(args: &MatchArgs) -> anyhow::Result<()> {
         "source": facts.json, "images": args.images, "target": found.target, "spec": found.target.to_string(),
         "searched": parameters, "saturated": found.saturated, "fitness": found.fitness,
         "fitness_of": if pictures.has_diffuse() { "diffuse and specular pictures" } else { "full pictures" },
-        "nrmsd": found.nrmsd[0], "nrmsd_masked": found.nrmsd[1], "nrmsd_light": LIGHTS[main_light(&pictures)],
+        "nrmsd": found.nrmsd[0], "nrmsd_of_noise": found.noise, "nrmsd_masked": found.nrmsd[1], "nrmsd_light": LIGHTS[main_light(&pictures)],
         "albedo": found.albedo, "tint": found.tint, "compared": found.compared,
         "is_decided": found.is_decided, "used": used, "checks": checks.iter().map(check_json).collect::<Vec<_>>(),
         "error_scales": scales, "scene": plan.scene.name, "size": plan.size, "mask": plan.mask,
@@ -361,22 +361,25 @@ fn summary(facts: &Facts, pictures: &Pictures, found: &PictureMatch, used: &[Str
     let light = LIGHTS[main_light(pictures)];
     let [whole, masked] = found.nrmsd;
     let mut text = format!("{}: from {}\n", facts.name, used.join(", "));
+    let named_rows = [
+        header,
+        row(format!("full_{light}.exr, whole image"), whole),
+        row(format!("full_{light}.exr, masked"), masked),
+    ];
+    let noise = (found.noise != [0.0; 3]).then(|| row("noise of the match alone".into(), found.noise));
+    let rows: Vec<Vec<String>> = named_rows.into_iter().chain(noise).collect();
     for (k, light) in LIGHTS.iter().enumerate().filter(|(k, _)| pictures.full[*k].is_none()) {
         text += &format!("note: no full_{light}.exr: {} alone decides\n", LIGHTS[1 - k]);
     }
     if !pictures.has_diffuse() {
         let body = match (found.albedo, pictures.albedo) {
-            (None, _) => "the target has no body",
+            (None, _) => "the target has no body of a free colour",
             (Some(_), Some(_)) => "the body's colour is the given one",
             (Some(_), None) => "the body's colour was fitted",
         };
         text += &format!("note: no diffuse pictures: full pictures were compared; {body}\n");
     }
-    text += &table(&[
-        header,
-        row(format!("full_{light}.exr, whole image"), whole),
-        row(format!("full_{light}.exr, masked"), masked),
-    ]);
+    text += &table(&rows);
     text += &format!("fitness {}, {} candidates\n", score(found.fitness), found.compared);
     if let Some(albedo) = found.albedo {
         text += &format!("albedo of the body {}\n", albedo.map(score).join(" "));
