@@ -249,7 +249,7 @@ mod tests {
         let [Suspicion::Curved { exponent }] = suspicions(&changed(|v| 1.2 * v.powf(0.45)))[..] else {
             panic!()
         };
-        assert!((exponent - 0.45).abs() < 1e-3);
+        assert!((exponent - 0.45).abs() < 0.02);
         let [Suspicion::Clipped { share }, ..] = suspicions(&changed(|v| v.min(1.0)))[..] else { panic!() };
         assert!((share - 0.3125).abs() < 1e-9, "{share}");
         let turned = |image: Image, x: bool| {
