@@ -462,8 +462,8 @@ impl Draft {
             for (role, value) in
                 [(Role::ConductorIndex, BRIGHT_METAL[0]), (Role::Extinction, BRIGHT_METAL[1])]
             {
-                let is_set = |name: &str| {
-                    self.held.iter().any(|held| *held == name) || self.given.iter().any(|given| given == name)
+                let is_set = |name: &'static str| {
+                    self.held.contains(&name) || self.given.iter().any(|given| given == name)
                 };
                 if !model.parameters.iter().any(|p| p.role == role && is_set(p.name)) {
                     self.fixed.set_role(role, [value; 3])?;
