@@ -42,6 +42,8 @@ pub(crate) enum Command {
     Scene(SceneArgs),
     /// Find mistakes in a material's numbers: gloss for roughness, sRGB for linear, F0 for an index, ...
     Lint(LintArgs),
+    /// Find the parameters of a model that look like pictures of the reference scene, by whatever renderer
+    Match(MatchArgs),
 }
 
 #[derive(Args)]
@@ -437,6 +439,40 @@ pub(crate) struct LintArgs {
     /// Side of the pictures that are compared, in pixels
     #[arg(long, default_value_t = 64, requires = "like")]
     pub(crate) size: usize,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct MatchArgs {
+    /// Folder with full_point.exr, full_environment.exr, and perhaps diffuse_point.exr, diffuse_environment.exr, material.json
+    pub(crate) images: PathBuf,
+    /// The model to search, with fixed values if wanted: ggx, gltf:metallic=1, mitsuba:roughplastic
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) to: String,
+    /// Lattice of one of its parameters
+    #[arg(long, value_name = "NAME=MIN:MAX:STEP", value_parser = vary)]
+    pub(crate) vary: Vec<Vary>,
+    /// Hold one of its parameters at a value
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    pub(crate) fix: Vec<Assignment>,
+    /// Weight the middle of the sphere more than its silhouette
+    #[arg(long)]
+    pub(crate) mask: bool,
+    /// Seed of all random decisions
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Samples per pixel of another renderer's pictures
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) samples: u32,
+    /// Samples per pixel up to which they are refined where noise leaves open what is best
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) max_samples: u32,
+    #[command(flatten)]
+    pub(crate) renderers: RendererArgs,
+    /// Folder for result.json and the pictures; made if it does not exist
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) json: Json,
 }

@@ -38,6 +38,11 @@ impl Neighbourhoods {
         Self { places: pixels.iter().map(around).collect() }
     }
 
+    /// Each pixel for itself, for so many pixels without noise: differences are then those of CIELAB exactly.
+    pub fn none(pixels: usize) -> Self {
+        Self { places: (0..pixels as u32).map(|place| vec![place]).collect() }
+    }
+
     fn smooth(&self, plane: &[f32]) -> Vec<f32> {
         let mean = |places: &Vec<u32>| {
             places.iter().map(|place| plane[*place as usize]).sum::<f32>() / places.len() as f32
@@ -190,6 +195,11 @@ mod tests {
             .squared_difference(&NoisyLab::new(&[b], &around), &[1.0; WIDTH * WIDTH]);
         assert!((found.sum / exact - 1.0).abs() < 0.02, "{} {exact}", found.sum);
         assert_eq!(found.error, 0.0);
+        let (a, b) = (picture(1.0), picture(1.3));
+        let alone = Neighbourhoods::none(WIDTH * WIDTH);
+        let found = NoisyLab::new(&[a], &alone)
+            .squared_difference(&NoisyLab::new(&[b], &alone), &[1.0; WIDTH * WIDTH]);
+        assert!((found.sum / exact - 1.0).abs() < 1e-4, "{} {exact}", found.sum);
     }
 
     #[test]

@@ -37,6 +37,22 @@ impl<'a> SourceLook<'a> {
         Self { albedo: known, ..Self::new(material) }
     }
 
+    /// A body of Lambert's as pictures show it, with the hue of the highlights. A target that is nothing but metal takes
+    /// that hue for its base colour.
+    pub(crate) fn pictured(body: &'a Material, tint: [f64; 3], is_metal: bool) -> Self {
+        let mut source = Self::new(body);
+        source.look.f0 = Some(tint);
+        if is_metal {
+            source.look.body = tint;
+        }
+        source
+    }
+
+    /// The material itself.
+    pub(crate) fn material(&self) -> &'a Material {
+        self.material
+    }
+
     /// With its albedo rounded, if it is not looked up yet or known from a measurement.
     pub(crate) fn rounded_albedo(mut self) -> Self {
         self.is_rounded = true;

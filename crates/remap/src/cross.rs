@@ -19,7 +19,9 @@ use lru::LruCache;
 use rayon::prelude::*;
 
 use crate::carry::{Body, SourceLook};
+use crate::from_pictures::Pictures;
 use crate::gallery::{Key, Stopped, key};
+use crate::picture_checks::check_pictures;
 use crate::probe::Noise;
 use crate::settle::Bowl;
 use crate::stage::LIGHTS;
@@ -37,6 +39,8 @@ const ROUNDS: usize = 4;
 const LAST_STEP: u32 = 4;
 /// Memory for looks, in bytes.
 const CAPACITY: usize = 500 << 20;
+/// Pictures with less noise, as a share of their brightness, have none.
+const CLEAN: f64 = 0.005;
 /// Share of a body's brightness that its measurement may be off by.
 const BODY_TOLERANCE: f64 = 0.005;
 /// Renders of a body that its measurement may take.
@@ -44,35 +48,48 @@ const BODY_STEPS: usize = 3;
 
 /// The reference scene with materials of other renderers on it, and ours.
 pub struct CrossStage {
-    own: Stage,
+    pub(crate) own: Stage,
     archives: Vec<Archive>,
-    sampling: Sampling,
+    pub(crate) sampling: Sampling,
     /// Weights of the subject's pixels: those of the mask, and 0 at silhouettes, where what is behind is nothing but noise.
-    weights: Vec<f32>,
-    around: Neighbourhoods,
+    pub(crate) weights: Vec<f32>,
+    pub(crate) around: Neighbourhoods,
     looks: Mutex<LruCache<Key, Arc<Look>>>,
+    /// True where looks keep their pictures.
+    keeps_linear: bool,
 }
 
 /// What the metric knows of a material, by light.
-struct Look {
-    specular: [NoisyLab; 2],
-    diffuse: Option<Diffuse>,
+pub(crate) struct Look {
+    pub(crate) specular: [NoisyLab; 2],
+    pub(crate) diffuse: Option<Diffuse>,
+    /// The pictures themselves, where they are kept.
+    pub(crate) linear: Option<Linear>,
     /// Samples of its pictures; as many as can be of ours, which have no noise.
     samples: u32,
 }
 
+/// Under the point light and under the environment.
+pub(crate) type ByLight<T> = [T; 2];
+
+/// Halves of linear pictures.
+pub(crate) struct Linear {
+    pub(crate) specular: ByLight<Vec<Planes>>,
+    pub(crate) diffuse: Option<ByLight<Vec<Planes>>>,
+}
+
 /// Diffuse pictures under both lights.
-struct Diffuse {
-    images: [NoisyLab; 2],
+pub(crate) struct Diffuse {
+    pub(crate) images: ByLight<NoisyLab>,
     /// Mean radiance under the environment, per channel.
-    level: [f64; 3],
+    pub(crate) level: [f64; 3],
 }
 
 /// A fitness and its standard error.
 #[derive(Clone, Copy, Debug)]
-struct Score {
-    value: f64,
-    error: f64,
+pub(crate) struct Score {
+    pub(crate) value: f64,
+    pub(crate) error: f64,
 }
 
 /// A sum of pictures: weights and materials.
@@ -138,7 +155,37 @@ impl CrossStage {
         // Two pictures, one smooth one and what is made of it, of two parts under two lights.
         let bytes = 4 * 4 * 3 * weights.len() * size_of::<f32>();
         let room = NonZeroUsize::new(CAPACITY / bytes.max(1)).unwrap_or(NonZeroUsize::MIN);
-        Ok(Self { own, archives, sampling, weights, around, looks: Mutex::new(LruCache::new(room)) })
+        Ok(Self {
+            own,
+            archives,
+            sampling,
+            weights,
+            around,
+            looks: Mutex::new(LruCache::new(room)),
+            keeps_linear: false,
+        })
+    }
+
+    /// [`CrossStage::cached`] for [`crate::match_pictures`]: keeps the pictures of looks as well as what the metric makes of
+    /// them. Nothing is smoothed where no noise is seen.
+    ///
+    /// # Errors
+    /// As [`CrossStage::cached`].
+    pub fn for_pictures(
+        plan: &Plan,
+        pictures: &Pictures,
+        studios: &[Arc<dyn Studio>],
+        cache: &TransportCache,
+        observe: Observe,
+    ) -> Result<Self, RemapError> {
+        let mut stage = Self { keeps_linear: true, ..Self::cached(plan, studios, cache, observe)? };
+        let checks = check_pictures(plan, &stage, pictures)?;
+        let mut noises = checks.iter().filter(|check| check.part == "full").map(|check| check.noise);
+        let is_clean = noises.all(|noise| noise.is_some_and(|noise| noise < CLEAN));
+        if is_clean && plan.to.model().renderer.is_none() {
+            stage.around = Neighbourhoods::none(stage.weights.len());
+        }
+        Ok(stage)
     }
 
     /// What each renderer has cost so far, by name.
@@ -229,8 +276,11 @@ impl CrossStage {
         let prepared = |planes: [Planes; 2]| planes.map(|planes| NoisyLab::new(&[planes], &self.around));
         let look = |[specular, diffuse]: [[Planes; 2]; 2]| {
             let level = self.level(std::slice::from_ref(&diffuse[1]));
+            let halves = |planes: &[Planes; 2]| planes.clone().map(|planes| vec![planes]);
+            let linear = || Linear { specular: halves(&specular), diffuse: Some(halves(&diffuse)) };
+            let linear = self.keeps_linear.then(linear);
             let diffuse = Some(Diffuse { level, images: prepared(diffuse) });
-            Ok(Look { specular: prepared(specular), diffuse, samples: u32::MAX })
+            Ok(Look { specular: prepared(specular), diffuse, linear, samples: u32::MAX })
         };
         planes.into_par_iter().map(look).collect()
     }
@@ -256,7 +306,12 @@ impl CrossStage {
         recipes.iter().map(look).collect()
     }
 
-    fn look(&self, material: &Material, whole: bool, samples: u32) -> Result<Arc<Look>, RemapError> {
+    pub(crate) fn look(
+        &self,
+        material: &Material,
+        whole: bool,
+        samples: u32,
+    ) -> Result<Arc<Look>, RemapError> {
         self.looks(std::slice::from_ref(material), whole, samples).swap_remove(0).map_err(RemapError::Render)
     }
 
@@ -278,15 +333,15 @@ impl CrossStage {
             let halves = pictures.iter().map(|(_, takes)| takes.halves.len()).max().unwrap_or(1);
             (0..halves).map(|half| self.summed(&pictures, half)).collect()
         };
-        let specular = [0, 1].map(|light| NoisyLab::new(&of_light(&recipe.specular, 0, light), &self.around));
-        let diffuse = whole.then(|| {
-            let planes = [0, 1].map(|light| of_light(&recipe.diffuse, recipe.specular.len(), light));
-            Diffuse {
-                level: self.level(&planes[1]),
-                images: planes.map(|planes| NoisyLab::new(&planes, &self.around)),
-            }
+        let halves = [0, 1].map(|light| of_light(&recipe.specular, 0, light));
+        let specular = [0, 1].map(|light| NoisyLab::new(&halves[light], &self.around));
+        let body = whole.then(|| [0, 1].map(|light| of_light(&recipe.diffuse, recipe.specular.len(), light)));
+        let diffuse = body.as_ref().map(|body| Diffuse {
+            level: self.level(&body[1]),
+            images: [0, 1].map(|light| NoisyLab::new(&body[light], &self.around)),
         });
-        Look { specular, diffuse, samples }
+        let linear = self.keeps_linear.then_some(Linear { specular: halves, diffuse: body });
+        Look { specular, diffuse, linear, samples }
     }
 
     /// A sum of pictures on the subject's pixels.
@@ -304,7 +359,7 @@ impl CrossStage {
     }
 
     /// Weighted mean of diffuse pictures under the environment.
-    fn level(&self, halves: &[Planes]) -> [f64; 3] {
+    pub(crate) fn level(&self, halves: &[Planes]) -> [f64; 3] {
         let total = halves.len() as f64 * self.weights.iter().copied().map(f64::from).sum::<f64>();
         std::array::from_fn(|c| {
             let sum = |planes: &Planes| -> f64 {
@@ -316,13 +371,24 @@ impl CrossStage {
 
     /// Equation 3 between two looks.
     fn score(&self, a: &Look, b: &Look, with_diffuse: bool) -> Score {
+        self.weighted_score(a, b, with_diffuse, self.own.part_weights())
+    }
+
+    /// [`CrossStage::score`] with weights by part and light; what has the weight 0 is not looked at.
+    pub(crate) fn weighted_score(
+        &self,
+        a: &Look,
+        b: &Look,
+        with_diffuse: bool,
+        weights: [ByLight<f64>; 2],
+    ) -> Score {
         let diffuse = a.diffuse.as_ref().zip(b.diffuse.as_ref()).filter(|_| with_diffuse);
         let parts = [Some((&a.specular, &b.specular)), diffuse.map(|(a, b)| (&a.images, &b.images))];
         let pixels = (self.own.size() * self.own.size()) as f64;
         let (mut value, mut variance) = (0.0, 0.0);
-        for (part, weights) in parts.into_iter().zip(self.own.part_weights()) {
+        for (part, weights) in parts.into_iter().zip(weights) {
             let Some((a, b)) = part else { continue };
-            for light in 0..2 {
+            for light in (0..2).filter(|light| weights[*light] > 0.0) {
                 let Estimate { sum, error } = a[light].squared_difference(&b[light], &self.weights);
                 value += weights[light] * (sum.abs() / pixels).sqrt().copysign(sum);
                 // Of the root, near 0 as well, where noise alone decides its size.
@@ -335,8 +401,24 @@ impl CrossStage {
 }
 
 impl Look {
+    /// A look of given pictures: specular ones, or whole ones where the parts are not told apart.
+    pub(crate) fn pictured(
+        stage: &CrossStage,
+        first: ByLight<Planes>,
+        diffuse: Option<(ByLight<Planes>, [f64; 3])>,
+    ) -> Self {
+        let prepared = |planes: Planes| NoisyLab::new(&[planes], &stage.around);
+        let diffuse = diffuse.map(|(images, level)| Diffuse { images: images.map(prepared), level });
+        Self { specular: first.map(prepared), diffuse, linear: None, samples: u32::MAX }
+    }
+
+    /// A look that is compared as a whole, and once.
+    pub(crate) fn compared(whole: ByLight<NoisyLab>) -> Self {
+        Self { specular: whole, diffuse: None, linear: None, samples: 0 }
+    }
+
     /// The brightness of the body.
-    fn level(&self) -> [f64; 3] {
+    pub(crate) fn level(&self) -> [f64; 3] {
         self.diffuse.as_ref().map_or([0.0; 3], |diffuse| diffuse.level)
     }
 }
@@ -352,23 +434,24 @@ fn noise(takes: &Takes) -> Option<Image> {
 }
 
 /// The end of a search.
-struct Settled {
-    best: Point,
-    is_decided: bool,
+pub(crate) struct Settled {
+    pub(crate) best: Point,
+    pub(crate) is_decided: bool,
     /// Samples of the pictures that decided it.
-    samples: u32,
+    pub(crate) samples: u32,
 }
 
-/// The fitness of target points against one source material.
-struct CrossMatch<'a> {
-    plan: &'a Plan,
-    stage: &'a CrossStage,
-    lattice: &'a Lattice,
-    source: SourceLook<'a>,
-    seen: Arc<Look>,
+/// The fitness of target points against one source.
+pub(crate) struct CrossMatch<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) stage: &'a CrossStage,
+    pub(crate) lattice: &'a Lattice,
+    pub(crate) source: SourceLook<'a>,
+    /// How far a look is from the source's.
+    pub(crate) score: &'a (dyn Fn(&Look) -> Score + Sync),
     /// Points that were compared so far.
-    scores: HashMap<Point, f64>,
-    stop: &'a (dyn Fn() -> bool + Sync),
+    pub(crate) scores: HashMap<Point, f64>,
+    pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl CrossMatch<'_> {
@@ -384,17 +467,28 @@ impl CrossMatch<'_> {
 
     /// Scores of points at a number of samples; those that cannot be rendered score [`FAILED`].
     fn scored(&self, points: &[Point], samples: u32) -> Result<Vec<Score>, RemapError> {
-        let with_diffuse = self.body() == Body::Matched;
         let looks = self.stage.looks(&self.targets(points)?, false, samples);
         let score = |look: Result<Arc<Look>, String>| match look {
-            Ok(look) => self.stage.score(&self.seen, &look, with_diffuse),
+            Ok(look) => (self.score)(&look),
             Err(_) => Score { value: FAILED, error: 0.0 },
         };
-        Ok(looks.into_iter().map(score).collect())
+        Ok(looks.into_par_iter().map(score).collect())
+    }
+
+    /// The best point, and whether noise leaves no doubt of it.
+    pub(crate) fn searched(&mut self, problem: &Problem, most: u32) -> Result<Settled, RemapError> {
+        let found = self.by_method(problem)?;
+        if found.fitness >= FAILED {
+            let reasons = self.stage.counts().into_iter().flat_map(|(_, counts)| counts.reasons);
+            return Err(RemapError::Render(
+                reasons.last().unwrap_or_else(|| "no target could be rendered".into()),
+            ));
+        }
+        self.settled(found.best, problem, most)
     }
 
     /// Where the search method of the plan ends.
-    fn searched(&mut self, problem: &Problem) -> Result<Outcome, RemapError> {
+    fn by_method(&mut self, problem: &Problem) -> Result<Outcome, RemapError> {
         if self.plan.search != "survey" {
             return searched(self.plan, problem, self);
         }
@@ -493,26 +587,21 @@ impl CrossStage {
         let seen = self.look(&source, true, most)?;
         let level = seen.level();
         let rounded = self.carried(&source, level)?.rounded_albedo();
+        let with_diffuse = plan.to.model().renderer.is_none();
         let mut objective = CrossMatch {
             plan,
             stage: self,
             lattice: problem.lattice,
             source: rounded,
-            seen: seen.clone(),
+            score: &|look| self.score(&seen, look, with_diffuse),
             scores: HashMap::new(),
             stop,
         };
-        let found = objective.searched(problem)?;
-        if found.fitness >= FAILED {
-            let reasons = self.counts().into_iter().flat_map(|(_, counts)| counts.reasons);
-            return Err(RemapError::Render(
-                reasons.last().unwrap_or_else(|| "no target could be rendered".into()),
-            ));
-        }
-        let Settled { best, is_decided, samples } = objective.settled(found.best, problem, most)?;
+        let Settled { best, is_decided, samples } = objective.searched(problem, most)?;
         let compared = objective.scores.len();
         let target_values = problem.lattice.values(&best);
-        let (target, body) = self.with_body(plan, &source, &target_values, (level, samples))?;
+        let carried = self.carried(&source, level)?;
+        let (target, body) = self.with_body(plan, &carried, &target_values, (level, samples))?;
         let score = self.score(&seen, &*self.look(&target, true, samples)?, true);
         let ([nrmsd, nrmsd_masked], floor) = self.nrmsd(&source, &target, samples)?;
         let fitness = score.value.max(0.0);
@@ -543,20 +632,20 @@ impl CrossStage {
     }
 
     /// The target with a body as bright as the source's, and what its colour is of the source's.
-    fn with_body(
+    pub(crate) fn with_body(
         &self,
         plan: &Plan,
-        source: &Material,
+        look: &SourceLook,
         values: &[f64],
         (level, samples): ([f64; 3], u32),
     ) -> Result<(Material, [f64; 3]), RemapError> {
-        let look = self.carried(source, level)?;
+        let source = look.material();
         if plan.to.model().renderer.is_none() {
-            let target = plan.target_with(&look, values, Body::Matched)?;
+            let target = plan.target_with(look, values, Body::Matched)?;
             let gain = ratio(body_colour(&target), body_colour(source));
             return Ok((target, gain));
         }
-        let scaled = |gain| plan.target_with(&look, values, Body::Scaled(gain));
+        let scaled = |gain| plan.target_with(look, values, Body::Scaled(gain));
         let mut gain = [1.0; 3];
         let mut target = scaled(gain)?;
         let is_same = std::ptr::eq(source.model(), target.model());

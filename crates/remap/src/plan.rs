@@ -187,8 +187,14 @@ const SIZES: std::ops::RangeInclusive<usize> = 16..=2048;
 /// Up to here an index of refraction is widened in equal steps: it stands for a reflectance of 0.4.
 const EQUAL_STEPS: f64 = 4.45;
 
+/// η and k of a metal without colour that reflects 0.965 of what falls on it: about as much as silver.
+const BRIGHT_METAL: [f64; 2] = [0.15, 4.0];
+
 /// Step of the scale of a conductor that is to look like something else.
 const SCALE_STEP: f64 = 0.02;
+
+/// The brightest reflectance at normal incidence that pictures are expected to show: that of silver is 0.97.
+const PICTURED_F0: f64 = 0.9;
 
 /// Levels of a source axis in a quick remap, at most.
 const QUICK_LEVELS: usize = 5;
@@ -208,6 +214,28 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`].
     pub fn between(from: Endpoint, to: Endpoint, options: &Options) -> Result<Self, RemapError> {
+        Self::drafted(from, to, options, false)
+    }
+
+    /// The match of pictures: the source stands for what they show, the body's colour aside, and the target's ranges are wide
+    /// enough for metals, since no parameters tell how bright the highlights can be. A target that is a metal is searched for its
+    /// brightness.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn from_pictures(to: Endpoint, scene: Scene, options: &Options) -> Result<Self, RemapError> {
+        let from = Endpoint::Named(Material::parse("lambert")?);
+        let plan = Self::drafted(from, to, options, true)?;
+        let scene = scene.for_model(plan.to.model());
+        Ok(Self { scene, strategy: Strategy::Unconstrained, ..plan })
+    }
+
+    fn drafted(
+        from: Endpoint,
+        to: Endpoint,
+        options: &Options,
+        is_pictured: bool,
+    ) -> Result<Self, RemapError> {
         let search = match (options.search.as_str(), to.model().renderer) {
             (AUTO, None) => "genetic",
             (AUTO, Some(_)) => "survey",
@@ -217,6 +245,7 @@ impl Plan {
         let surveyed = if let Endpoint::Model(model) = from { model.surveyed } else { &[] };
         let mut source = Draft::new(from.material(), surveyed, |r| r.survey)?;
         let mut target = Draft::new(to.material(), to.model().searched, |r| r.search)?;
+        let is_named = matches!(to, Endpoint::Named(_));
         let (from, to) = (from.model(), to.model());
         check_names(options, from, to)?;
         for vary in &options.vary {
@@ -229,6 +258,9 @@ impl Plan {
         }
         let from_material = source.fixed.clone().checked()?;
         target.suit(&from_material)?;
+        if is_pictured {
+            target.suit_pictures(is_named)?;
+        }
         if target.axes.is_empty() {
             let why = if to.searched.is_empty() {
                 "has no parameters to search: it can only be a source"
@@ -245,7 +277,7 @@ impl Plan {
         }
         target.follow(&source)?;
         if options.preset != Some(Preset::Paper) {
-            target.widen(highest_f0(&source)?)?;
+            target.widen(if is_pictured { Some(PICTURED_F0) } else { highest_f0(&source)? })?;
         }
         if options.quick {
             source.axes.iter_mut().for_each(|axis| *axis = thinned(axis));
@@ -426,6 +458,35 @@ impl Draft {
                 let axis = Axis::regular(scale.name, 0.0, 1.0, SCALE_STEP)?;
                 self.axes.insert(0, axis);
             }
+        }
+        Ok(())
+    }
+
+    /// Pictures of a metal tell its colour, which no parameter does. A conductor starts as bright as any, so that its scale
+    /// reaches all metals.
+    fn suit_pictures(&mut self, is_named: bool) -> Result<(), RemapError> {
+        let model = self.fixed.model();
+        if self.fixed.is_conductor() && !is_named {
+            for (role, value) in
+                [(Role::ConductorIndex, BRIGHT_METAL[0]), (Role::Extinction, BRIGHT_METAL[1])]
+            {
+                let is_set = |name: &'static str| {
+                    self.held.contains(&name) || self.given.iter().any(|given| given == name)
+                };
+                if !model.parameters.iter().any(|p| p.role == role && is_set(p.name)) {
+                    self.fixed.set_role(role, [value; 3])?;
+                }
+            }
+        }
+        let is_metal = self.fixed.by_role(Role::Metalness).is_some_and(|m| m.mean() == Some(1.0));
+        let base = model.parameters.iter().find(|p| p.role == Role::BaseColour).filter(|_| is_metal);
+        let Some(base) = base else { return Ok(()) };
+        let given = &self.given;
+        let role = |axis: &Axis| model.parameter(&axis.name).map(|p| p.role);
+        self.axes.retain(|axis| given.contains(&axis.name) || !role(axis).is_ok_and(Role::is_reflectance));
+        let is_set = self.axes.iter().any(|a| a.name == base.name) || self.held.contains(&base.name);
+        if !is_set {
+            self.insert(Axis::regular(base.name, 0.0, 1.0, SCALE_STEP)?)?;
         }
         Ok(())
     }

@@ -6,6 +6,7 @@ pub(crate) mod compare;
 pub(crate) mod eval;
 pub(crate) mod inspect;
 pub(crate) mod lint;
+pub(crate) mod match_pictures;
 pub(crate) mod models;
 pub(crate) mod pairs;
 pub(crate) mod remap;

@@ -66,7 +66,7 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
     let validation = match (&args.report, stage) {
         (Some(folder), None) => Some(report::write(&probe, folder)?),
         (Some(folder), Some(stage)) => {
-            report::write_across(&probe, &stage, args.max_samples, folder)?;
+            report::write_across(&probe, &stage, options.sampling.most, folder)?;
             None
         }
         (None, _) => None,
@@ -226,7 +226,7 @@ fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
 }
 
 /// A model or a named material with values to hold: `ward`, `ward:variant=duer` or `low-abc@chrome`.
-fn endpoint(text: &str, side: Side) -> anyhow::Result<(Endpoint, Vec<Assignment>)> {
+pub(crate) fn endpoint(text: &str, side: Side) -> anyhow::Result<(Endpoint, Vec<Assignment>)> {
     let (name, list) = split_name(text);
     let mut fix = Vec::new();
     for item in list.split(',').filter(|item| !item.is_empty()) {
