@@ -123,8 +123,7 @@ fn run(from: &str, to: &str, studio: &Arc<StandIn>, vary: Vec<Vary>) -> Result<P
     let plan = Plan::new(by_name(from).unwrap(), by_name(to).unwrap(), &options).unwrap();
     let studios: [Arc<dyn Studio>; 1] = [studio.clone()];
     let stage = CrossStage::cached(&plan, &studios, &cache(), &|_| ()).unwrap();
-    let probe = remap_across(&plan, &stage, None, &mut |_| {}, &|| false);
-    probe
+    remap_across(&plan, &stage, None, &mut |_| {}, &|| false)
 }
 
 const ROUGHNESSES: (f64, f64, f64) = (0.1, 0.5, 0.1);
