@@ -10,7 +10,7 @@ use anyhow::Context;
 use lookmatch_imaging::Image;
 use lookmatch_materials::{Description, Material, Model, by_name, split_name};
 use lookmatch_remap::{RendererRecord, Shot, Studio};
-use lookmatch_renderers::{Bundled, Installations, Job, Launch, Pool, PoolOptions, Stop};
+use lookmatch_renderers::{Bundled, Hello, Installations, Job, Launch, Pool, PoolOptions, Stop};
 use lookmatch_rendering::{Illumination, Scene};
 
 use crate::Usage;
@@ -119,6 +119,11 @@ impl Renderers {
             }
         };
         self.list.iter().map(record).collect()
+    }
+
+    /// What they say of themselves.
+    pub(crate) fn hellos(&self) -> impl Iterator<Item = &Hello> {
+        self.list.iter().map(|hired| hired.pool.hello())
     }
 
     /// One picture of a material of theirs.

@@ -233,7 +233,7 @@ fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
 }
 
 /// A model or a named material with values to hold: `ward`, `ward:variant=duer` or `low-abc@chrome`.
-fn endpoint(text: &str, side: Side) -> anyhow::Result<(Endpoint, Vec<Assignment>)> {
+pub(crate) fn endpoint(text: &str, side: Side) -> anyhow::Result<(Endpoint, Vec<Assignment>)> {
     let (name, list) = split_name(text);
     let mut fix = Vec::new();
     for item in list.split(',').filter(|item| !item.is_empty()) {
