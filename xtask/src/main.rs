@@ -9,13 +9,14 @@ const USAGE: &str = "\
 Usage: cargo xtask COMMAND
 
 Commands:
-  test   Check format, lints, tests and documentation; stop at the first failure
-  help   Print this text
+  test [--all-renderers]   Check format, lints, tests, documentation and real renderers; stop at the first failure.
+                           Mitsuba and Radiance are installed for it; with --all-renderers all that lookmatch knows
+  help                     Print this text
 
 Exit codes: 0 all is well, 1 a step failed, 2 the command line is wrong";
 
 /// What must pass before a change goes in, quickest first.
-const STEPS: [Step; 5] = [
+const STEPS: [Step; 6] = [
     Step {
         name: "format",
         variable: None,
@@ -58,7 +59,31 @@ const STEPS: [Step; 5] = [
         component: None,
         program: Some("python3"),
     },
+    RENDERERS,
 ];
+
+/// Real renderers, installed and driven; one after the other, because each uses all cores.
+const RENDERERS: Step = Step {
+    name: "renderers",
+    variable: None,
+    arguments: &[
+        "test",
+        "--package",
+        "lookmatch",
+        "--test",
+        "renderers",
+        "--locked",
+        "--",
+        "--ignored",
+        "--test-threads=1",
+    ],
+    files: None,
+    component: None,
+    program: Some("python3"),
+};
+
+/// The last step with all renderers.
+const ALL_RENDERERS: Step = Step { variable: Some(("LOOKMATCH_TEST_RENDERERS", "all")), ..RENDERERS };
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect();
@@ -67,20 +92,30 @@ fn main() -> ExitCode {
             println!("{USAGE}");
             ExitCode::SUCCESS
         }
-        ["test"] => match run_all(&STEPS, Step::run) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(message) => {
-                eprintln!("\nxtask: {message}");
-                ExitCode::FAILURE
-            }
-        },
+        ["test"] => test(&STEPS),
+        ["test", "--all-renderers"] => {
+            let mut steps = STEPS;
+            steps[STEPS.len() - 1] = ALL_RENDERERS;
+            test(&steps)
+        }
         [command @ ("test" | "help"), extra, ..] => {
-            eprintln!("xtask: '{command}' takes no arguments; found '{extra}'");
+            let accepted = if command == "test" { "no argument but --all-renderers" } else { "no arguments" };
+            eprintln!("xtask: '{command}' takes {accepted}; found '{extra}'");
             ExitCode::from(2)
         }
         [unknown, ..] => {
             eprintln!("xtask: unknown command '{unknown}'; valid commands: test, help");
             ExitCode::from(2)
+        }
+    }
+}
+
+fn test(steps: &[Step]) -> ExitCode {
+    match run_all(steps, Step::run) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("\nxtask: {message}");
+            ExitCode::FAILURE
         }
     }
 }

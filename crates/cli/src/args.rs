@@ -169,8 +169,9 @@ pub(crate) struct RemapArgs {
     /// How the results of neighbouring source points are used
     #[arg(long, value_enum, default_value = "constrained")]
     pub(crate) strategy: StrategyName,
-    /// genetic, exhaustive, genetic-guarnera2018 or genetic-deep2009
-    #[arg(long, default_value = "genetic")]
+    /// genetic, survey, exhaustive, genetic-guarnera2018, genetic-deep2009, or auto: genetic, and survey where the target is a
+    /// model of another renderer
+    #[arg(long, default_value = "auto")]
     pub(crate) search: String,
     /// Lattice of a parameter; without `source.` or `target.` before the name, the source's if it has one
     #[arg(long, value_name = "NAME=MIN:MAX:STEP", value_parser = vary)]

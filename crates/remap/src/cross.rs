@@ -12,7 +12,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd};
 use lookmatch_materials::{BlackBody, Material, Role};
 use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
-use lookmatch_search::{Lattice, Objective, ObjectiveError, Point, Problem, SearchError};
+use lookmatch_search::{
+    Lattice, Objective, ObjectiveError, Outcome, Point, Problem, Search, SearchError, Survey,
+};
 use lru::LruCache;
 use rayon::prelude::*;
 
@@ -30,7 +32,9 @@ const SCENES: [&str; 2] = ["reference-point", "reference-environment"];
 /// Fitness of a candidate that could not be rendered: worse than any picture can be.
 const FAILED: f64 = 1e9;
 /// Bowls that are looked into before a search gives up to find the bottom.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 4;
+/// Levels of the last step of a search among noisy candidates.
+const LAST_STEP: u32 = 4;
 /// Memory for looks, in bytes.
 const CAPACITY: usize = 500 << 20;
 /// Share of a body's brightness that its measurement may be off by.
@@ -389,6 +393,17 @@ impl CrossMatch<'_> {
         Ok(looks.into_iter().map(score).collect())
     }
 
+    /// Where the search method of the plan ends.
+    fn searched(&mut self, problem: &Problem) -> Result<Outcome, RemapError> {
+        if self.plan.search != "survey" {
+            return searched(self.plan, problem, self);
+        }
+        // Single steps are lost in noise: the bowl will tell.
+        let is_noisy = self.stage.archives.iter().any(|archive| archive.studio.has_noise());
+        let survey = Survey { last_step: if is_noisy { LAST_STEP } else { 1 }, ..Survey::default() };
+        survey.run(problem, self).map_err(RemapError::Search)
+    }
+
     /// Renders candidates around the best with more and more samples, until it is known which is the best or the budget ends;
     /// says which it was.
     fn settled(&mut self, found: Point, problem: &Problem, most: u32) -> Result<Settled, RemapError> {
@@ -472,7 +487,7 @@ impl CrossStage {
         problem: &Problem,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Matched, RemapError> {
-        let Sampling { samples, most } = self.sampling;
+        let most = self.sampling.most;
         let source = plan.source_material(values)?;
         // It takes part in every comparison, and is rendered but once.
         let seen = self.look(&source, true, most)?;
@@ -487,7 +502,7 @@ impl CrossStage {
             scores: HashMap::new(),
             stop,
         };
-        let found = searched(plan, problem, &mut objective)?;
+        let found = objective.searched(problem)?;
         if found.fitness >= FAILED {
             let reasons = self.counts().into_iter().flat_map(|(_, counts)| counts.reasons);
             return Err(RemapError::Render(

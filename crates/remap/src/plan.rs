@@ -65,7 +65,7 @@ pub struct Assignment {
 pub struct Options {
     /// How neighbours are used.
     pub strategy: Strategy,
-    /// Name of the search method.
+    /// Name of the search method, or `auto`: `genetic`, and `survey` where targets are dear.
     pub search: String,
     /// Lattices that replace the default ones.
     pub vary: Vec<Vary>,
@@ -91,7 +91,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             strategy: Strategy::Constrained,
-            search: "genetic".into(),
+            search: AUTO.into(),
             vary: Vec::new(),
             fix: Vec::new(),
             preset: None,
@@ -178,6 +178,9 @@ pub struct Plan {
     pub renderers: Vec<RendererRecord>,
 }
 
+/// The search that suits the target.
+const AUTO: &str = "auto";
+
 /// Sides of the reference pictures that can be compared: smaller ones show no highlight.
 const SIZES: std::ops::RangeInclusive<usize> = 16..=2048;
 
@@ -205,7 +208,12 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`].
     pub fn between(from: Endpoint, to: Endpoint, options: &Options) -> Result<Self, RemapError> {
-        lookmatch_search::by_name(&options.search).map_err(|e| RemapError::Option(e.to_string()))?;
+        let search = match (options.search.as_str(), to.model().renderer) {
+            (AUTO, None) => "genetic",
+            (AUTO, Some(_)) => "survey",
+            (name, _) => name,
+        };
+        lookmatch_search::by_name(search).map_err(|e| RemapError::Option(e.to_string()))?;
         let surveyed = if let Endpoint::Model(model) = from { model.surveyed } else { &[] };
         let mut source = Draft::new(from.material(), surveyed, |r| r.survey)?;
         let mut target = Draft::new(to.material(), to.model().searched, |r| r.search)?;
@@ -254,7 +262,7 @@ impl Plan {
             source_axes: source.axes,
             target_axes: target.axes,
             strategy: options.strategy,
-            search: options.search.clone(),
+            search: search.to_owned(),
             held: target.held.iter().map(|name| (*name).to_owned()).collect(),
             preset: options.preset,
             seed: options.seed,

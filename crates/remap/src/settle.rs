@@ -4,7 +4,7 @@
 //! the best form a bowl, and all of them together tell where its bottom is: a quadratic in the parameters, fitted by least squares
 //! (the response surface of Box and Wilson 1951). Its own standard error says whether more samples are needed.
 
-use lookmatch_search::{Bounds, Lattice, Point};
+use lookmatch_search::{Bounds, Lattice, Point, spread};
 use nalgebra::{DMatrix, DVector};
 
 /// Levels to each side of the best that belong to the bowl at first, and in the end.
@@ -69,7 +69,7 @@ impl<'a> Bowl<'a> {
             if points.len() >= wanted {
                 break;
             }
-            let point = self.spread(k);
+            let point = spread(&self.bounds, k);
             let near = known.iter().filter(|other| distance(other, &point) <= 1 && !points.contains(other));
             let point = near.min_by_key(|other| distance(other, &point)).unwrap_or(&point).clone();
             if !points.contains(&point) {
@@ -95,11 +95,6 @@ impl<'a> Bowl<'a> {
         };
         let fit = &inverse * design.transpose() * &scores;
         let residual = (&scores - &design * &fit).norm_squared() / freedom as f64;
-        let value = |point: &Point| self.terms(point).iter().zip(fit.iter()).map(|(t, c)| t * c).sum::<f64>();
-        let least = self.points(candidates).into_iter().min_by(|a, b| {
-            let order = value(a).total_cmp(&value(b));
-            order.then_with(|| a.cmp(b))
-        });
         // The bottom of a x² + b x lies at −b/2a, and is as uncertain as b.
         let error = |k: usize| {
             let (slope, curve) = (1 + k, 1 + self.axes.len() + k);
@@ -110,6 +105,16 @@ impl<'a> Bowl<'a> {
                 f64::INFINITY
             }
         };
+        // Along an axis that shows nothing, what the search found is as good as anything.
+        let is_told = |k: usize| error(k) < self.reach(self.axes[k]) / 2.0;
+        let untold: Vec<usize> =
+            (0..self.axes.len()).filter(|k| !is_told(*k)).map(|k| self.axes[k]).collect();
+        let stays = |point: &Point| untold.iter().all(|axis| point[*axis] == self.centre[*axis]);
+        let value = |point: &Point| self.terms(point).iter().zip(fit.iter()).map(|(t, c)| t * c).sum::<f64>();
+        let least = self.points(candidates).into_iter().filter(stays).min_by(|a, b| {
+            let order = value(a).total_cmp(&value(b));
+            order.then_with(|| a.cmp(b))
+        });
         let point = least.unwrap_or_else(best);
         let is_on_side = self.is_on_side(&point);
         let is_known = self.is_narrow && !is_on_side && (0..self.axes.len()).all(|k| error(k) < KNOWN);
@@ -144,26 +149,12 @@ impl<'a> Bowl<'a> {
         (0..point.len()).all(|axis| (self.bounds.low[axis]..=self.bounds.high[axis]).contains(&point[axis]))
     }
 
-    /// True where a point lies on a side of the bowl behind which the lattice goes on.
+    /// True where a point lies on a side of the bowl, and the lattice goes on behind it.
     fn is_on_side(&self, point: &Point) -> bool {
         self.axes.iter().any(|axis| {
             let (low, high, index) = (self.bounds.low[*axis], self.bounds.high[*axis], point[*axis]);
             index == low && low > self.within.low[*axis] || index == high && high < self.within.high[*axis]
         })
-    }
-
-    /// The `k`-th of points that fill the bowl evenly (Roberts 2018: powers of the root of x^(d+1) = x + 1).
-    fn spread(&self, k: u32) -> Point {
-        let dimensions = self.axes.len();
-        let mut root = 2.0f64;
-        (0..30).for_each(|_| root = (1.0 + root).powf(1.0 / (dimensions as f64 + 1.0)));
-        let mut point = self.centre.clone();
-        for (place, axis) in self.axes.iter().enumerate() {
-            let share = (0.5 + f64::from(k) * root.powi(-(place as i32 + 1))).fract();
-            let (low, high) = (self.bounds.low[*axis], self.bounds.high[*axis]);
-            point[*axis] = low + (share * f64::from(high - low + 1)) as u32;
-        }
-        point
     }
 
     fn points(&self, candidates: &[(Point, f64)]) -> Vec<Point> {

@@ -7,7 +7,7 @@ A worker is a file that imports this module before anything else and ends with `
     scene(name, scene, environment)                  environment: float32 array (height, width, 3), or None
     material(model, values)                          values: dict, complete
     render(name, samples, seed) -> (pixels, info)    pixels: (size, size, 3), row 0 on top; info: more fields of the answer
-    close()                                          optional
+    close()                                          optional; may be called in the middle of a render
 
 Errors that a user can understand are raised as `Refused`; any other exception is reported with its last line and logged whole.
 """
@@ -113,12 +113,20 @@ def _send(message, data=b""):
             packet = packet[_answers.write(packet) :]
 
 
-def progress(identity, done):
-    """Tells how much of a request is done, 0 to 1."""
-    _send({"id": identity, "progress": done})
+_current = None
 
 
-def _read(requests):
+def progress(done):
+    """Tells how much of the current request is done, 0 to 1: a worker that says nothing for long is taken for dead."""
+    _send({"id": _current, "progress": done})
+
+
+def _close(renderer):
+    if hasattr(renderer, "close"):
+        renderer.close()
+
+
+def _read(requests, renderer):
     """Reads requests for ever; the end of the input ends the process, whatever it is doing."""
     stdin = sys.stdin.buffer
     for line in stdin:
@@ -127,6 +135,7 @@ def _read(requests):
         if request["request"] == "cancel":
             cancelled.set()
         requests.put((request, data))
+    _close(renderer)
     os._exit(0)
 
 
@@ -159,11 +168,12 @@ def _answer(renderer, request, data):
 
 def serve(renderer):
     """Answers requests until the input ends or a shutdown is asked for."""
+    global _current
     requests = queue.Queue()
-    threading.Thread(target=_read, args=(requests,), daemon=True).start()
+    threading.Thread(target=_read, args=(requests, renderer), daemon=True).start()
     while True:
         request, data = requests.get()
-        identity = request.get("id")
+        identity = _current = request.get("id")
         try:
             answer, data = _answer(renderer, request, data)
             _send({"id": identity, **answer}, data)
@@ -173,7 +183,6 @@ def serve(renderer):
             traceback.print_exc()
             _send({"id": identity, "error": f"{type(failure).__name__}: {failure}"})
         if request["request"] == "shutdown":
-            if hasattr(renderer, "close"):
-                renderer.close()
+            _close(renderer)
             # Some renderers abort when the interpreter takes them down.
             os._exit(0)

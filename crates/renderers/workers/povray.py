@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 # /// script
-# requires-python = ">=3.10"
+# requires-python = ">=3.10,<3.13"
 # dependencies = ["OpenEXR==3.5.3", "numpy==1.26.4"]
 #
 # [tool.lookmatch]

@@ -33,6 +33,7 @@ mod problem;
 mod registry;
 mod sampling;
 mod settings;
+mod survey;
 
 pub use axis::Axis;
 pub use error::{ObjectiveError, SearchError};
@@ -43,3 +44,4 @@ pub use memo::Memo;
 pub use problem::{Objective, ObjectiveFn, Outcome, Problem, Search};
 pub use registry::{Entry, by_name, registry};
 pub use settings::{Breeding, Duplicates, GeneticSettings, OutOfBounds, StallDivisor, Start, Tournament};
+pub use survey::{Survey, spread};

@@ -101,7 +101,7 @@ fn equal_seeds_give_equal_outcomes() {
 fn guesses_are_evaluated() {
     let lattice = square(200, 3);
     let hole = vec![123, 45, 67];
-    for name in ["genetic", "genetic-guarnera2018", "genetic-deep2009"] {
+    for name in ["genetic", "genetic-guarnera2018", "genetic-deep2009", "survey"] {
         let problem = Problem { guesses: vec![hole.clone()], ..whole(&lattice, 5) };
         let mut flat = ObjectiveFn(|p: &Point| if *p == hole { 0.0 } else { 1.0 });
         let outcome = by_name(name).and_then(|s| s.run(&problem, &mut flat)).expect("a sound problem");
