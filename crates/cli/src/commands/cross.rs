@@ -408,7 +408,7 @@ impl<'a> Judge<'a> {
 }
 
 /// Differences of NRMSD below this share of the noise are none.
-const TOLERANCE: f64 = 0.1;
+const TOLERANCE: f64 = 0.05;
 
 impl Outcome {
     fn is_same_model(&self) -> bool {
@@ -499,7 +499,7 @@ fn introduction(run: &Run) -> String {
          *Noise* is what two equal pictures with the noise of source and probe would have. NRMSD is that of the whole picture, \
          averaged over channels and materials. JOD is the prediction of ColorVideoVDP: 10 is no visible difference, 1 less is \
          seen by three observers of four ({VIEWING}). A probe counts as better or worse than the copy where their NRMSDs are further \
-         apart than a tenth of the noise.\n",
+         apart than a twentieth of the noise.\n",
         run.program,
         run.seed,
         versions.join(", "),
