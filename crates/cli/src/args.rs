@@ -28,6 +28,8 @@ pub(crate) enum Command {
     Remap(RemapArgs),
     /// Map every model to every other, and compare each probe with copied parameters
     Pairs(PairsArgs),
+    /// Map models of real renderers to each other, and judge each probe beside copied parameters
+    Cross(CrossArgs),
     /// Map one material through a probe
     Apply(ApplyArgs),
     /// Say what is in a probe
@@ -268,6 +270,32 @@ pub(crate) struct PairsArgs {
 }
 
 #[derive(Args)]
+pub(crate) struct CrossArgs {
+    /// Only these pairs; all if not given, for which mitsuba, cycles, luxcore, radiance and threejs must be installed
+    #[arg(value_name = "PAIR")]
+    pub(crate) pairs: Vec<String>,
+    /// Side of the pictures of the search in pixels
+    #[arg(long, default_value_t = 64)]
+    pub(crate) size: usize,
+    /// Samples per pixel of the pictures of the search
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) samples: u32,
+    /// Samples per pixel up to which they are refined where noise leaves open what is best
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) max_samples: u32,
+    /// Seed of all random decisions
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) renderers: RendererArgs,
+    /// Folder for cross-renderer.md and its pictures; a run that was stopped goes on from the last pair
+    #[arg(short, long)]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
 pub(crate) struct ApplyArgs {
     /// The probe file
     pub(crate) probe: PathBuf,
@@ -383,7 +411,8 @@ fn side(name: &str) -> (Option<Side>, String) {
     }
 }
 
-fn vary(text: &str) -> Result<Vary, String> {
+/// Reads `NAME=MIN:MAX:STEP`.
+pub(crate) fn vary(text: &str) -> Result<Vary, String> {
     let wrong = || "expected NAME=MIN:MAX:STEP with three numbers".to_owned();
     let (name, lattice) = text.split_once('=').ok_or_else(wrong)?;
     let numbers: Vec<f64> =

@@ -47,6 +47,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Remap(args) => commands::remap::run(&args),
         Command::Apply(args) => commands::apply::run(&args),
         Command::Pairs(args) => commands::pairs::run(&args),
+        Command::Cross(args) => commands::cross::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
         Command::Validate(args) => commands::validate::run(&args),

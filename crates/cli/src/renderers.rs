@@ -10,7 +10,7 @@ use anyhow::Context;
 use lookmatch_imaging::Image;
 use lookmatch_materials::{Description, Material, Model, by_name, split_name};
 use lookmatch_remap::{RendererRecord, Shot, Studio};
-use lookmatch_renderers::{Bundled, Installations, Job, Launch, Pool, PoolOptions, Stop};
+use lookmatch_renderers::{Bundled, Hello, Installations, Job, Launch, Pool, PoolOptions, Stop};
 use lookmatch_rendering::{Illumination, Scene};
 
 use crate::Usage;
@@ -154,6 +154,11 @@ impl Renderers {
     pub(crate) fn models(&self) -> anyhow::Result<Vec<&'static Model>> {
         let of = |hired: &Arc<Hired>| hired.models.iter().map(|m| m.adopt(&hired.name)).collect::<Vec<_>>();
         Ok(self.list.iter().flat_map(of).collect::<Result<_, _>>()?)
+    }
+
+    /// What they say of themselves.
+    pub(crate) fn hellos(&self) -> impl Iterator<Item = &Hello> {
+        self.list.iter().map(|hired| hired.pool.hello())
     }
 
     /// Pictures of materials of one of them, each with its own seed.

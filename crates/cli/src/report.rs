@@ -128,18 +128,24 @@ fn strip(validator: &Validator, place: usize, path: &Path) -> anyhow::Result<Str
         titles.zip(targets).filter_map(|(title, target)| Some((title, target?))).unzip();
     let reference = validator.render(&[&source]).swap_remove(0);
     let images = validator.render(&targets.iter().collect::<Vec<_>>());
-    let scales = images.iter().map(|image| Ok(error_map(&reference, image, None)?.1));
+    let (image, scale) = sheet(&reference, &images)?;
+    write_image(path, &image, &[])?;
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    columns.insert(0, "source");
+    Ok(Strip { file, source, target: targets[0].clone(), columns, scale })
+}
+
+/// A picture with those that should look like it to its right, and below each its difference; the difference that is drawn brightest.
+pub(crate) fn sheet(reference: &Image, images: &[Image]) -> anyhow::Result<(Image, f32)> {
+    let scales = images.iter().map(|image| Ok(error_map(reference, image, None)?.1));
     let scale = scales.collect::<anyhow::Result<Vec<f32>>>()?.into_iter().fold(0.0, f32::max);
-    let error = |image: &Image| -> anyhow::Result<Image> { Ok(error_map(&reference, image, Some(scale))?.0) };
+    let error = |image: &Image| -> anyhow::Result<Image> { Ok(error_map(reference, image, Some(scale))?.0) };
     let errors = images.iter().map(error).collect::<anyhow::Result<Vec<_>>>()?;
     let none = Image::new(reference.width(), reference.height());
     let row = |first: &Image, rest: &[Image]| {
         Image::beside(&std::iter::once(first).chain(rest).collect::<Vec<_>>())
     };
-    write_image(path, &above(&row(&reference, &images), &row(&none, &errors)), &[])?;
-    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    columns.insert(0, "source");
-    Ok(Strip { file, source, target: targets[0].clone(), columns, scale })
+    Ok((above(&row(reference, images), &row(&none, &errors)), scale))
 }
 
 /// Renders source and match of an entry beside each other, and their difference.

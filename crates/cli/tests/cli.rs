@@ -539,6 +539,12 @@ fn pairs_are_scored_and_a_stopped_run_goes_on() {
     assert_eq!(again["pairs"].as_array().unwrap().iter().filter(|pair| pair["points"] == 37).count(), 1);
     refused(of, &["pairs", "merl", "-o", "pairs"], 2, &["none of the models can be a target"]);
     refused(of, &["pairs", "ward", "merl-file", "-o", "pairs"], 2, &["merl-file", "needs a file"]);
+    refused(
+        of,
+        &["cross", "ward-ggx", "-o", "cross"],
+        2,
+        &["ward-ggx", "there are roughplastic-principled,"],
+    );
 }
 
 #[test]

@@ -8,6 +8,9 @@ use std::path::PathBuf;
 /// Each message names the file or field, the value found, and what would be accepted.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
+    /// The prediction of what people see could not be made.
+    #[error("ColorVideoVDP: {0}")]
+    Prediction(#[from] colorvideovdp::Error),
     /// The operating system refused: no such file, no permission, disk full.
     #[error("cannot {action} `{}`: {source}", path.display())]
     Io {

@@ -23,6 +23,7 @@ pub use file::{MAX_PIXELS, decode, read, write};
 pub use image::Image;
 pub use lab::{lab_planes, lab_planes_of, squared_distance, weighted_squared_distance};
 pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
+pub use metrics::jod::{VIEWING, jod};
 pub use metrics::mask::{Mask, disc_weight};
 pub use metrics::nrmsd::{nrmsd, nrmsd_pixels};
 pub use noisy::{Estimate, Neighbourhoods, NoisyLab};

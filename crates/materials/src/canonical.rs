@@ -95,7 +95,9 @@ impl Material {
             return scaled(f0);
         }
         if let Some(level) = self.mean(Role::SpecularLevel) {
-            return scaled([0.08 * level; 3]);
+            // Of 0.08, which is twice the reflectance of an index of 1.5; beside an index, of twice that index's.
+            let f0 = self.mean(Role::RefractiveIndex).map_or(0.04, f0_from_ior);
+            return scaled([2.0 * level * f0; 3]);
         }
         match self.mean(Role::RefractiveIndex) {
             Some(ior) => scaled([f0_from_ior(ior); 3]),
@@ -154,11 +156,12 @@ impl Material {
         if has(Role::NormalReflectance) {
             return self.set_role(Role::NormalReflectance, f0);
         }
-        if has(Role::SpecularLevel) {
+        if has(Role::SpecularLevel) && !has(Role::RefractiveIndex) {
             return self.set_role(Role::SpecularLevel, [mean / 0.08; 3]);
         }
         if has(Role::RefractiveIndex) {
             self.set_role(Role::SpecularReflectance, [some; 3])?;
+            self.set_role(Role::SpecularLevel, [some / 2.0; 3])?;
             // No index has F0 = 1 or 0; the closest that a model can hold.
             return self.set_role(Role::RefractiveIndex, [ior_from_f0(mean.clamp(1e-6, 0.96)); 3]);
         }
@@ -224,5 +227,18 @@ mod tests {
         ggx.set_alpha([0.1, 0.4]).unwrap();
         let read = ggx.canonical();
         assert!((read.f0.unwrap()[1] - 0.1).abs() < 1e-12 && read.alpha == Some([0.1, 0.4]));
+    }
+    #[test]
+    fn a_level_beside_an_index_scales_what_the_index_says() {
+        let f0 = |text: &str| canonical(text).f0.unwrap()[0];
+        assert!(
+            (f0("principled:ior=1.5") - 0.04).abs() < 1e-12
+                && (f0("disney:specular=0.5") - 0.04).abs() < 1e-12
+        );
+        assert!((f0("principled:ior=2") - 1.0 / 9.0).abs() < 1e-12);
+        assert!((f0("principled:ior=2,specular_ior_level=0.25") - 1.0 / 18.0).abs() < 1e-12);
+        let mut glass = Material::parse("principled:specular_ior_level=0.1").unwrap();
+        glass.set_f0([1.0 / 9.0; 3]).unwrap();
+        assert!((glass.number("ior").unwrap() - 2.0).abs() < 1e-9 && f0(&glass.to_string()) > 0.11);
     }
 }

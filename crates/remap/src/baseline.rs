@@ -46,6 +46,14 @@ impl Baseline {
             Self::Copy if shares_index => {
                 target.set_role(Role::SpecularReflectance, [scale.unwrap_or(1.0); 3])?;
             }
+            // The index stays as it is: the scale makes up for it.
+            Self::Copy if target.is_conductor() => {
+                target.set_role(Role::SpecularReflectance, [1.0; 3])?;
+                if let Some((wanted, own)) = look.f0.zip(target.canonical().f0) {
+                    let scale = std::array::from_fn(|c| wanted[c] / own[c].max(1e-9));
+                    target.set_role(Role::SpecularReflectance, scale)?;
+                }
+            }
             Self::Copy => look.f0.map_or(Ok(()), |f0| target.set_f0(f0))?,
             Self::CopyWithoutFresnel => {
                 let f0 = look.f0.filter(|_| look.index.is_none());
@@ -88,5 +96,7 @@ mod tests {
         let back = apply(Baseline::Copy, &ggx.to_string(), "ward").unwrap();
         assert!((back.number("specular").unwrap() - 0.04).abs() < 1e-9);
         assert!(apply(Baseline::CopyWithoutFresnel, "ggx", "ward").is_none());
+        let metal = apply(Baseline::Copy, ward, "ggx-conductor").unwrap();
+        assert!((metal.canonical().f0.unwrap()[0] - 0.04).abs() < 1e-9, "{metal}");
     }
 }

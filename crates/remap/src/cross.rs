@@ -13,7 +13,7 @@ use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd};
 use lookmatch_materials::{BlackBody, Material, Role};
 use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
 use lookmatch_search::{
-    Lattice, Objective, ObjectiveError, Outcome, Point, Problem, Search, SearchError, Survey,
+    Axis, Lattice, Objective, ObjectiveError, Outcome, Point, Problem, Search, SearchError, Survey,
 };
 use lru::LruCache;
 use rayon::prelude::*;
@@ -501,6 +501,9 @@ impl CrossMatch<'_> {
     /// Renders candidates around the best with more and more samples, until it is known which is the best or the budget ends;
     /// says which it was.
     fn settled(&mut self, found: Point, problem: &Problem, most: u32) -> Result<Settled, RemapError> {
+        let model = self.plan.to.model();
+        let is_width = |axis: &Axis| model.parameter(&axis.name).is_ok_and(|p| p.role.is_width());
+        let ratios: Vec<bool> = self.lattice.axes.iter().map(is_width).collect();
         let mut samples = self.stage.sampling.samples;
         let mut centre = found;
         let mut round = 0;
@@ -508,7 +511,7 @@ impl CrossMatch<'_> {
             if (self.stop)() {
                 return Err(stopped());
             }
-            let bowl = Bowl::around(self.lattice, &centre, &problem.bounds, round);
+            let bowl = Bowl::around((self.lattice, &ratios), &centre, &problem.bounds, round);
             let points = bowl.candidates(self.scores.keys());
             let scores = self.scored(&points, samples)?;
             if scores.iter().all(|score| score.error == 0.0 || score.value >= FAILED) {

@@ -26,6 +26,9 @@ pub(crate) struct Bowl<'a> {
     within: Bounds,
     /// Axes along which it has a shape: not those of switches.
     axes: Vec<usize>,
+    /// Axes of the lattice on which equal ratios look equally different: the widths of lobes. In their logarithms the bowl has
+    /// sides that are alike.
+    ratios: &'a [bool],
     /// True where it is as narrow as it gets: the bottom of a wider one, whose sides are not alike, is off to the flatter side.
     is_narrow: bool,
 }
@@ -40,7 +43,12 @@ pub(crate) struct Bottom {
 
 impl<'a> Bowl<'a> {
     /// The bowl around a point, within bounds, in the given round of narrowing.
-    pub(crate) fn around(lattice: &'a Lattice, centre: &Point, within: &Bounds, round: u32) -> Self {
+    pub(crate) fn around(
+        (lattice, ratios): (&'a Lattice, &'a [bool]),
+        centre: &Point,
+        within: &Bounds,
+        round: u32,
+    ) -> Self {
         let reach = (REACH[0] >> round).max(REACH[1]);
         let is_free = |axis: &usize| lattice.axes[*axis].len() > 2 && within.low[*axis] < within.high[*axis];
         let axes: Vec<usize> = (0..centre.len()).filter(is_free).collect();
@@ -55,6 +63,7 @@ impl<'a> Bowl<'a> {
             bounds,
             within: within.clone(),
             axes,
+            ratios,
             is_narrow: reach == REACH[1],
         }
     }
@@ -99,14 +108,11 @@ impl<'a> Bowl<'a> {
         let error = |k: usize| {
             let (slope, curve) = (1 + k, 1 + self.axes.len() + k);
             let error = (residual * inverse[(slope, slope)]).sqrt();
-            if fit[curve] > 0.0 {
-                self.reach(self.axes[k]) * error / (2.0 * fit[curve])
-            } else {
-                f64::INFINITY
-            }
+            let bottom = error / (2.0 * fit[curve] * self.level(self.axes[k]));
+            if fit[curve] > 0.0 { bottom } else { f64::INFINITY }
         };
         // Along an axis that shows nothing, what the search found is as good as anything.
-        let is_told = |k: usize| error(k) < self.reach(self.axes[k]) / 2.0;
+        let is_told = |k: usize| error(k) * self.level(self.axes[k]) < 1.0;
         let untold: Vec<usize> =
             (0..self.axes.len()).filter(|k| !is_told(*k)).map(|k| self.axes[k]).collect();
         let stays = |point: &Point| untold.iter().all(|axis| point[*axis] == self.centre[*axis]);
@@ -123,11 +129,7 @@ impl<'a> Bowl<'a> {
 
     /// 1, x, x², and products.
     fn terms(&self, point: &Point) -> Vec<f64> {
-        let x: Vec<f64> = self
-            .axes
-            .iter()
-            .map(|axis| (f64::from(point[*axis]) - f64::from(self.centre[*axis])) / self.reach(*axis))
-            .collect();
+        let x: Vec<f64> = self.axes.iter().map(|axis| self.coordinate(*axis, point[*axis])).collect();
         let mut terms = vec![1.0];
         terms.extend(&x);
         terms.extend(x.iter().map(|x| x * x));
@@ -135,14 +137,31 @@ impl<'a> Bowl<'a> {
         terms
     }
 
+    /// Where an index lies along an axis: 0 in the middle of the bowl, 1 on its farther side.
+    fn coordinate(&self, axis: usize, index: u32) -> f64 {
+        let sides = [self.bounds.low[axis], self.bounds.high[axis]].map(|side| self.offset(axis, side).abs());
+        self.offset(axis, index) / sides[0].max(sides[1])
+    }
+
+    fn offset(&self, axis: usize, index: u32) -> f64 {
+        let level = |index: u32| self.lattice.axes[axis].value(index as usize);
+        let [here, centre] = [index, self.centre[axis]].map(level);
+        if self.ratios[axis] && here > 0.0 && centre > 0.0 {
+            return (here / centre).ln();
+        }
+        f64::from(index) - f64::from(self.centre[axis])
+    }
+
+    /// How far one level next to the middle goes along an axis.
+    fn level(&self, axis: usize) -> f64 {
+        let centre = self.centre[axis];
+        let next = if centre < self.bounds.high[axis] { centre + 1 } else { centre.saturating_sub(1) };
+        self.coordinate(axis, next).abs()
+    }
+
     fn coefficients(&self) -> usize {
         let axes = self.axes.len();
         1 + 2 * axes + axes * axes.saturating_sub(1) / 2
-    }
-
-    fn reach(&self, axis: usize) -> f64 {
-        let (low, high) = (self.bounds.low[axis], self.bounds.high[axis]);
-        f64::from((high - self.centre[axis]).max(self.centre[axis] - low)).max(1.0)
     }
 
     fn contains(&self, point: &Point) -> bool {
@@ -191,7 +210,7 @@ mod tests {
     fn found(noise: f64, round: u32) -> Bottom {
         let lattice = lattice();
         let whole = Bounds::full(&lattice);
-        let bowl = Bowl::around(&lattice, &vec![1, 27, 26], &whole, round);
+        let bowl = Bowl::around((&lattice, &[false; 3]), &vec![1, 27, 26], &whole, round);
         let candidates = bowl.candidates(std::iter::empty());
         assert_eq!(candidates.len(), 18);
         let reach = if round == 0 { 12 } else { 6 };
@@ -217,7 +236,7 @@ mod tests {
     #[test]
     fn known_points_stand_in_for_their_neighbours() {
         let lattice = lattice();
-        let bowl = Bowl::around(&lattice, &vec![1, 5, 5], &Bounds::full(&lattice), 1);
+        let bowl = Bowl::around((&lattice, &[false; 3]), &vec![1, 5, 5], &Bounds::full(&lattice), 1);
         let wanted = bowl.candidates(std::iter::empty());
         let beside = vec![1, wanted[3][1] + 1, wanted[3][2]];
         let known = [beside.clone(), vec![0, 5, 5], vec![1, 40, 5]];

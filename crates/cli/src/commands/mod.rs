@@ -3,6 +3,7 @@
 pub(crate) mod apply;
 pub(crate) mod bench;
 pub(crate) mod compare;
+pub(crate) mod cross;
 pub(crate) mod eval;
 pub(crate) mod inspect;
 pub(crate) mod lint;

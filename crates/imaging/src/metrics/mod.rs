@@ -1,6 +1,7 @@
 //! Numbers for how far apart two renderings look. Exact, in `f64`; one metric a file.
 
 pub mod fitness;
+pub mod jod;
 pub mod mask;
 pub mod nrmsd;
 
