@@ -33,6 +33,8 @@ use crate::{Entry, Plan, RemapError, Stage};
 const SCENES: [&str; 2] = ["reference-point", "reference-environment"];
 /// Fitness of a candidate that could not be rendered: worse than any picture can be.
 const FAILED: f64 = 1e9;
+/// Times as many samples as the finest candidates have for the source.
+const SOURCE: u32 = 8;
 /// Bowls that are looked into before a search gives up to find the bottom.
 const ROUNDS: usize = 4;
 /// Levels of the last step of a search among noisy candidates.
@@ -586,8 +588,8 @@ impl CrossStage {
     ) -> Result<Matched, RemapError> {
         let most = self.sampling.most;
         let source = plan.source_material(values)?;
-        // It takes part in every comparison, and is rendered but once.
-        let seen = self.look(&source, true, most)?;
+        // It takes part in every comparison, so that no number of candidates averages its noise out; and is rendered but once.
+        let seen = self.look(&source, true, SOURCE * most)?;
         let level = seen.level();
         let rounded = self.carried(&source, level)?.rounded_albedo();
         let with_diffuse = plan.to.model().renderer.is_none();
