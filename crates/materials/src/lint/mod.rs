@@ -1,9 +1,9 @@
 //! What is probably wrong with the numbers of a material, and what was probably meant.
 //!
-//! Two ways: [`lint`] judges the numbers alone, by the rules of [`RULES`]; [`readings`] lists what each number could have been
+//! Two ways: [`lint`] judges the numbers alone, by the rules of `RULES`; [`readings`] lists what each number could have been
 //! meant as, for whoever can render and compare.
 //!
-//! Adding a rule takes a function and a line in [`RULES`]; adding a meaning takes a line in `readings.rs`.
+//! Adding a rule takes a function and a line in `RULES`; adding a meaning takes a line in `readings.rs`.
 
 mod colours;
 mod fresnel;
