@@ -66,15 +66,14 @@ fn numbers(value: &Json) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-/// The same formula on both sides: `expected` of the source's number comes back within a step, and what is left is at most
-/// `multiple` times the noise.
-fn comes_back(entries: &[Json], multiple: f64, expected: impl Fn(f64) -> f64) {
+/// The same formula on both sides: `expected` of the source's number comes back within a step, and what is left is noise.
+fn comes_back(entries: &[Json], expected: impl Fn(f64) -> f64) {
     assert!(!entries.is_empty());
     for entry in entries {
         let (source, target) = (numbers(&entry["source"])[0], numbers(&entry["target"])[0]);
         assert!((target - expected(source)).abs() < 1.01 * STEP, "{entry}");
         let (nrmsd, floor) = (numbers(&entry["nrmsd"]), numbers(&entry["noise"]["nrmsd"]));
-        assert!(nrmsd.iter().sum::<f64>() < multiple * floor.iter().sum::<f64>(), "{entry}");
+        assert!(nrmsd.iter().sum::<f64>() < 1.2 * floor.iter().sum::<f64>(), "{entry}");
     }
 }
 
@@ -99,7 +98,7 @@ fn microfacets_come_back_from_mitsuba() {
              {distribution}:diffuse=0,fresnel=none,specular=1,ior=1.5 --vary source.alpha=0.15:0.45:0.15 \
              --vary target.roughness=0.02:0.7:0.01 --max-samples 256"
         );
-        comes_back(&entries(folder.path(), &remap), 1.2, |alpha| alpha);
+        comes_back(&entries(folder.path(), &remap), |alpha| alpha);
     }
 }
 
@@ -109,9 +108,14 @@ fn radiances_plastic_is_wards() {
     install("radiance");
     let folder = TempDir::new().unwrap();
     let remap = "remap ward:variant=gmd,specular=0.1,diffuse=0.3 radiance:plastic:specularity=0.1 \
-         --vary source.roughness=0.1:0.3:0.1 --vary target.roughness=0.02:0.5:0.01 --max-samples 256";
-    // Ours has no noise, and Radiance's environment is an approximation of about 1 %.
-    comes_back(&entries(folder.path(), remap), 1.6, |alpha| alpha);
+         --vary source.roughness=0.1:0.2:0.1 --vary target.roughness=0.02:0.4:0.02 --max-samples 32";
+    // Ours has no noise, and Radiance's environment is an approximation of about 1 %; its noise allows steps of 0.02.
+    for entry in entries(folder.path(), remap) {
+        let (source, target) = (numbers(&entry["source"])[0], numbers(&entry["target"])[0]);
+        assert!((target - source).abs() < 0.021, "{entry}");
+        let (nrmsd, floor) = (numbers(&entry["nrmsd"]), numbers(&entry["noise"]["nrmsd"]));
+        assert!(nrmsd.iter().sum::<f64>() < 1.6 * floor.iter().sum::<f64>(), "{entry}");
+    }
 }
 
 #[test]
@@ -130,12 +134,12 @@ fn microfacets_travel_between_mitsuba_and_cycles() {
             "remap {mitsuba} {cycles} --vary source.alpha=0.1:0.4:0.15 --vary target.roughness=0.1:0.85:0.01 \
              --max-samples 256"
         );
-        comes_back(&entries(folder.path(), &there), 1.2, f64::sqrt);
+        comes_back(&entries(folder.path(), &there), f64::sqrt);
         let back = format!(
             "remap {cycles} {mitsuba} --vary source.roughness=0.3:0.7:0.2 --vary target.alpha=0.02:0.7:0.01 \
              --max-samples 256"
         );
-        comes_back(&entries(folder.path(), &back), 1.2, |roughness| roughness * roughness);
+        comes_back(&entries(folder.path(), &back), |roughness| roughness * roughness);
     }
 }
 
