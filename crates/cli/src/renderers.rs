@@ -214,14 +214,6 @@ impl Studio for Hired {
         &self.name
     }
 
-    fn version(&self) -> &str {
-        &self.pool.hello().version
-    }
-
-    fn models(&self) -> &[Description] {
-        &self.models
-    }
-
     fn has_noise(&self) -> bool {
         self.pool.hello().capabilities.noise
     }

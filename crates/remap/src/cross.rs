@@ -195,13 +195,7 @@ impl CrossStage {
         self.archives.iter().map(|a| (a.studio.name().to_owned(), a.counts())).collect()
     }
 
-    /// Our own renderer on the same stage.
-    pub fn own(&self) -> &Stage {
-        &self.own
-    }
-
-    /// The picture of a material under the environment, and its noise: the root mean square error of each pixel as an image,
-    /// about.
+    /// The picture of a material under a light, the point light or the environment, and what noise makes of each pixel, about.
     ///
     /// # Errors
     /// Where it cannot be rendered.
@@ -236,11 +230,7 @@ impl CrossStage {
         let mask = self.own.views()[1].mask();
         let mut floor = [0.0; 3];
         for noise in [noise_a, noise_b].into_iter().flatten() {
-            let mut noisy = a.clone();
-            for (out, noise) in noisy.pixels_mut().iter_mut().zip(noise.pixels()) {
-                (0..3).for_each(|c| out[c] += noise[c]);
-            }
-            let share = nrmsd(&a, &noisy, None)?;
+            let share = noise_alone(&a, &noise)?;
             (0..3).for_each(|c| floor[c] += share[c] * share[c]);
         }
         Ok(([nrmsd(&a, &b, None)?, nrmsd(&a, &b, Some(mask))?], floor.map(f64::sqrt)))
@@ -433,6 +423,14 @@ fn noise(takes: &Takes) -> Option<Image> {
         (0..3).for_each(|c| out[c] = (out[c] - other[c]) / 2.0);
     }
     Some(noise)
+}
+
+/// NRMSD per channel of a picture and the same with noise added.
+pub(crate) fn noise_alone(picture: &Image, noise: &Image) -> Result<[f64; 3], RemapError> {
+    let mut noisy = picture.clone();
+    let values = noise.pixels().as_flattened();
+    noisy.pixels_mut().as_flattened_mut().iter_mut().zip(values).for_each(|(value, noise)| *value += noise);
+    Ok(nrmsd(picture, &noisy, None)?)
 }
 
 /// The end of a search.

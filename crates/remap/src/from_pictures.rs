@@ -16,7 +16,7 @@ use lookmatch_rendering::Planes;
 use lookmatch_search::{Bounds, Lattice, Point, Problem, SearchError};
 
 use crate::carry::SourceLook;
-use crate::cross::{ByLight, CrossMatch, Look, Score, Settled};
+use crate::cross::{ByLight, CrossMatch, Look, Score, Settled, noise_alone};
 use crate::gallery::Stopped;
 use crate::stage::LIGHTS;
 use crate::{CrossStage, Plan, RemapError};
@@ -472,14 +472,6 @@ fn weights([specular, diffuse]: [ByLight<f64>; 2], pictures: &Pictures) -> [ByLi
         true => [present(specular), present(diffuse)],
         false => [present([0, 1].map(|l| specular[l] + diffuse[l])), [0.0; 2]],
     }
-}
-
-/// NRMSD of a picture and the same with noise added.
-fn noise_alone(picture: &Image, noise: &Image) -> Result<[f64; 3], RemapError> {
-    let mut noisy = picture.clone();
-    let values = noise.pixels().as_flattened();
-    noisy.pixels_mut().as_flattened_mut().iter_mut().zip(values).for_each(|(value, noise)| *value += noise);
-    Ok(nrmsd(picture, &noisy, None)?)
 }
 
 /// A picture's subject pixels; black without one.

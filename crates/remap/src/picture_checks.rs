@@ -87,7 +87,7 @@ pub fn check_pictures(
     pictures: &Pictures,
 ) -> Result<Vec<PictureCheck>, RemapError> {
     let grey = Material::parse("lambert:diffuse=0.3")?;
-    let ours = [0, 1].map(|light| stage.own().views()[light].render(&grey, Part::Full));
+    let ours = [0, 1].map(|light| stage.own.views()[light].render(&grey, Part::Full));
     let coverage = plan.scene.coverage(plan.size);
     let mut checks = Vec::new();
     for (part, images) in [("full", &pictures.full), ("diffuse", &pictures.diffuse)] {

@@ -18,12 +18,6 @@ pub trait Studio: Send + Sync {
     /// What it is called: the part of `RENDERER:MODEL` before the colon.
     fn name(&self) -> &str;
 
-    /// Its version.
-    fn version(&self) -> &str;
-
-    /// How it describes its models.
-    fn models(&self) -> &[Description];
-
     /// False where its pictures have no noise, and so need no more than one.
     fn has_noise(&self) -> bool;
 

@@ -64,14 +64,6 @@ impl Studio for StandIn {
         "stand-in"
     }
 
-    fn version(&self) -> &str {
-        "1"
-    }
-
-    fn models(&self) -> &[Description] {
-        &self.models
-    }
-
     fn has_noise(&self) -> bool {
         true
     }

@@ -21,6 +21,7 @@ use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
 
 pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
+    check_output(&args.output)?;
     let stopped = interruption()?;
     let named: Vec<String> =
         [&args.from, &args.to].into_iter().filter_map(|text| renderer_of(text)).collect();
@@ -32,7 +33,6 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
     let models = [from.model(), to.model()];
     let options = Options { renderers: renderers.records(&models), ..options(args, fix) };
     let plan = Plan::between(from, to, &options)?;
-    check_output(&args.output)?;
     if let Some(folder) = &args.report {
         create_folder(folder)?;
     }
@@ -92,8 +92,8 @@ struct Cost {
     failed: usize,
     /// Time that was spent waiting for it.
     renderer_s: f64,
-    /// All other time of the search, with that of the other renderer.
-    rest_s: f64,
+    /// Time of the search in our own code, the same for all renderers of a remap.
+    own_s: f64,
     cpu_s: f64,
     restarts: u64,
     reasons: Vec<String>,
@@ -148,7 +148,7 @@ fn search_across(
             renders: counts.renders,
             failed: counts.failed,
             renderer_s: counts.waited.as_secs_f64(),
-            rest_s: all - waited,
+            own_s: all - waited,
             cpu_s: usage.map_or(0.0, |usage| usage.cpu_s),
             restarts: usage.map_or(0, |usage| usage.restarts),
             reasons: counts.reasons,
