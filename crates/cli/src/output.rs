@@ -100,7 +100,7 @@ pub(crate) fn spinner(what: &str) -> ProgressBar {
     spinner
 }
 
-/// Six digits after the point, as the paper's tables have four: enough to compare.
+/// Four digits after the point, as the paper's tables have them.
 pub(crate) fn score(value: f64) -> String {
     format!("{value:.4}")
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lookmatch_imaging::{Image, error_map, write as write_image, write_atomically};
+use lookmatch_imaging::{Image, Mask, error_map, error_scale, write as write_image, write_atomically};
 use lookmatch_materials::Material;
 use lookmatch_remap::{
     Baseline, CrossStage, MethodScores, Probe, ValidationReport, Validator, validation_points,
@@ -128,16 +128,17 @@ fn strip(validator: &Validator, place: usize, path: &Path) -> anyhow::Result<Str
         titles.zip(targets).filter_map(|(title, target)| Some((title, target?))).unzip();
     let reference = validator.render(&[&source]).swap_remove(0);
     let images = validator.render(&targets.iter().collect::<Vec<_>>());
-    let (image, scale) = sheet(&reference, &images)?;
+    let (image, scale) = sheet(&reference, &images, validator.mask())?;
     write_image(path, &image, &[])?;
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     columns.insert(0, "source");
     Ok(Strip { file, source, target: targets[0].clone(), columns, scale })
 }
 
-/// A picture with those that should look like it to its right, and below each its difference; the difference that is drawn brightest.
-pub(crate) fn sheet(reference: &Image, images: &[Image]) -> anyhow::Result<(Image, f32)> {
-    let scales = images.iter().map(|image| Ok(error_map(reference, image, None)?.1));
+/// A picture with those that should look like it to its right, and below each its difference; the difference that is drawn
+/// brightest, as the subjects have it.
+pub(crate) fn sheet(reference: &Image, images: &[Image], subjects: &Mask) -> anyhow::Result<(Image, f32)> {
+    let scales = images.iter().map(|image| Ok(error_scale(reference, image, subjects)?));
     let scale = scales.collect::<anyhow::Result<Vec<f32>>>()?.into_iter().fold(0.0, f32::max);
     let error = |image: &Image| -> anyhow::Result<Image> { Ok(error_map(reference, image, Some(scale))?.0) };
     let errors = images.iter().map(error).collect::<anyhow::Result<Vec<_>>>()?;
@@ -160,7 +161,8 @@ fn strip_across(
     let target = probe.target_material(&source, &entry.target, entry.body)?;
     let picture = |material| stage.picture(material, Illumination::Environment, samples);
     let [(a, _), (b, _)] = [picture(&source)?, picture(&target)?];
-    let (error, scale) = error_map(&a, &b, None)?;
+    let mask = probe.scene.mask(a.width())?;
+    let (error, scale) = error_map(&a, &b, Some(error_scale(&a, &b, &mask)?))?;
     write_image(path, &Image::beside(&[&a, &b, &error]), &[])?;
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(Strip { file, source, target, columns: vec!["source", "match", "error"], scale })

@@ -246,7 +246,7 @@ impl Material {
             Value::Number(v) => Ok(*v),
             Value::Colour(c) => Ok(c[0]),
             Value::List(v) if !v.is_empty() => Ok(v[0]),
-            other => Err(bad_value(self.model, index, &show(other))),
+            other => Err(bad_value(self.model, index, &show(other, None))),
         }
     }
 
@@ -282,7 +282,7 @@ impl Material {
                 Err(MaterialError::OutOfRange {
                     model: self.model.name.into(),
                     name: parameter.name.into(),
-                    value: show(&value),
+                    value: show(&value, None),
                     range: range.valid.to_string(),
                 })
             }
@@ -291,11 +291,12 @@ impl Material {
     }
 }
 
+/// The text that [`Material::parse`] reads. A precision rounds numbers to that many significant digits, for people: `{:.4}`.
 impl std::fmt::Display for Material {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.model.name)?;
         for (k, (parameter, value)) in self.model.parameters.iter().zip(&self.values).enumerate() {
-            write!(f, "{}{}={}", if k == 0 { ':' } else { ',' }, parameter.name, show(value))?;
+            write!(f, "{}{}={}", if k == 0 { ':' } else { ',' }, parameter.name, show(value, f.precision()))?;
         }
         Ok(())
     }
@@ -414,12 +415,18 @@ fn syntax(text: &str, reason: String) -> MaterialError {
     MaterialError::Syntax { text: text.to_owned(), reason }
 }
 
-fn show(value: &Value) -> String {
+fn show(value: &Value, digits: Option<usize>) -> String {
+    let number = |v: &f64| match digits {
+        Some(digits) => {
+            format!("{v:.0$e}", digits.saturating_sub(1)).parse::<f64>().unwrap_or(*v).to_string()
+        }
+        None => v.to_string(),
+    };
     match value {
-        Value::Number(v) => v.to_string(),
-        Value::Colour([r, g, b]) if r == g && g == b => r.to_string(),
-        Value::Colour([r, g, b]) => format!("{r}/{g}/{b}"),
-        Value::List(v) => v.iter().map(f64::to_string).collect::<Vec<_>>().join("/"),
+        Value::Number(v) => number(v),
+        Value::Colour([r, g, b]) if r == g && g == b => number(r),
+        Value::Colour(v) => v.iter().map(number).collect::<Vec<_>>().join("/"),
+        Value::List(v) => v.iter().map(number).collect::<Vec<_>>().join("/"),
         Value::Choice(name) => (*name).to_owned(),
         Value::File(file) => file.path.to_string(),
     }
@@ -448,6 +455,13 @@ mod tests {
             assert_eq!(Material::from_json(&material.to_json()).unwrap(), material);
             assert!(material.values().iter().enumerate().all(|(i, v)| material.check(i, v.clone()).is_ok()));
         }
+    }
+
+    #[test]
+    fn a_precision_is_a_number_of_significant_digits() {
+        let material = Material::parse("ward:specular=0.16000000000000003,diffuse=0.123456/0.5/1").unwrap();
+        let text = format!("{material:.4}");
+        assert!(text.contains("diffuse=0.1235/0.5/1") && text.contains("specular=0.16,"), "{text}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd};
+use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd, nrmsd_of_noise};
 use lookmatch_materials::{BlackBody, Material, Role};
 use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
 use lookmatch_search::{
@@ -230,7 +230,7 @@ impl CrossStage {
         let mask = self.own.views()[1].mask();
         let mut floor = [0.0; 3];
         for noise in [noise_a, noise_b].into_iter().flatten() {
-            let share = noise_alone(&a, &noise)?;
+            let share = nrmsd_of_noise(&a, &noise, None)?;
             (0..3).for_each(|c| floor[c] += share[c] * share[c]);
         }
         Ok(([nrmsd(&a, &b, None)?, nrmsd(&a, &b, Some(mask))?], floor.map(f64::sqrt)))
@@ -423,14 +423,6 @@ fn noise(takes: &Takes) -> Option<Image> {
         (0..3).for_each(|c| out[c] = (out[c] - other[c]) / 2.0);
     }
     Some(noise)
-}
-
-/// NRMSD per channel of a picture and the same with noise added.
-pub(crate) fn noise_alone(picture: &Image, noise: &Image) -> Result<[f64; 3], RemapError> {
-    let mut noisy = picture.clone();
-    let values = noise.pixels().as_flattened();
-    noisy.pixels_mut().as_flattened_mut().iter_mut().zip(values).for_each(|(value, noise)| *value += noise);
-    Ok(nrmsd(picture, &noisy, None)?)
 }
 
 /// The end of a search.

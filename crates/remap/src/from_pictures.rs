@@ -10,13 +10,13 @@
 
 use std::collections::HashMap;
 
-use lookmatch_imaging::{Image, NoisyLab, nrmsd};
+use lookmatch_imaging::{Image, NoisyLab, nrmsd, nrmsd_of_noise};
 use lookmatch_materials::{Material, Role, Value, hue};
 use lookmatch_rendering::Planes;
 use lookmatch_search::{Bounds, Lattice, Point, Problem, SearchError};
 
 use crate::carry::SourceLook;
-use crate::cross::{ByLight, CrossMatch, Look, Score, Settled, noise_alone};
+use crate::cross::{ByLight, CrossMatch, Look, Score, Settled};
 use crate::gallery::Stopped;
 use crate::stage::LIGHTS;
 use crate::{CrossStage, Plan, RemapError};
@@ -268,7 +268,7 @@ impl<'a> Matching<'a> {
         }
         let main = pictures.main_light();
         let (a, b) = pictures.full[main].as_ref().zip(shown[main].as_ref()).ok_or_else(lost)?;
-        let noise = noises[main].as_ref().map_or(Ok([0.0; 3]), |noise| noise_alone(a, noise))?;
+        let noise = noises[main].as_ref().map_or(Ok([0.0; 3]), |noise| nrmsd_of_noise(a, noise, None))?;
         let mask = stage.own.views()[1].mask();
         Ok(PictureMatch {
             nrmsd: [nrmsd(a, b, None)?, nrmsd(a, b, Some(mask))?],

@@ -1,6 +1,6 @@
 //! How good a probe is where no search has looked: another scene, other light, beside what people do without it.
 
-use lookmatch_imaging::{Image, nrmsd};
+use lookmatch_imaging::{Image, Mask, nrmsd};
 use lookmatch_materials::Material;
 use lookmatch_rendering::{EnvironmentLight, Illumination, Observe, Part, Renderer, Scene, TransportCache};
 use rayon::prelude::*;
@@ -171,6 +171,11 @@ impl<'a> Validator<'a> {
             targets.push(rule.apply(&source, &self.probe.to)?);
         }
         Ok((source, targets))
+    }
+
+    /// The radial mask of the scene's spheres.
+    pub fn mask(&self) -> &Mask {
+        self.renderer.mask()
     }
 
     /// Pictures of some materials in the scene, in their order.

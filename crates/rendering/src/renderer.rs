@@ -3,7 +3,8 @@
 use std::io;
 use std::sync::LazyLock;
 
-use lookmatch_imaging::{Image, Mask};
+use glam::DVec3;
+use lookmatch_imaging::{Image, Mask, luminance};
 use lookmatch_materials::{Bsdf, Material, Role};
 use rayon::prelude::*;
 
@@ -11,7 +12,7 @@ use crate::bodies::{Bodies, Body};
 use crate::bounce::{Bounce, MODES, Weights};
 use crate::cache::{Observe, Progress, TransportCache};
 use crate::field::Field;
-use crate::film::Film;
+use crate::film::{EDGE_SUBSAMPLES, Film, SUBSAMPLES};
 use crate::flat::{Flat, Reader, Writer};
 use crate::gather;
 use crate::highlights::Highlights;
@@ -387,13 +388,12 @@ fn difference(a: &Weights, b: &Weights) -> Weights {
 /// What pixels see of the checkerboard for an irradiance in each mode.
 fn seen_modes(field: &Field, film: &Film, bounce: &Bounce) -> Vec<(u32, [f32; MODES])> {
     let pixel = |pixel: u32| {
-        // As many positions as what lies before the checkerboard is seen through.
-        let (_, count) = film.points(&field.bodies, pixel as usize);
+        let (directions, share) = beside_subjects(field, film, pixel as usize);
         let mut sums = [0.0; MODES];
-        for direction in film.directions(pixel as usize, count) {
+        for direction in directions {
             if let Some((u, v, brightness)) = field.board_from(film.eye, direction) {
                 let values = bounce.modes.at(u, v);
-                (0..MODES).for_each(|m| sums[m] += brightness * values[m] / count as f32);
+                (0..MODES).for_each(|m| sums[m] += share * brightness * values[m]);
             }
         }
         (sums != [0.0; MODES]).then_some((pixel, sums))
@@ -404,16 +404,39 @@ fn seen_modes(field: &Field, film: &Film, bounce: &Bounce) -> Vec<(u32, [f32; MO
 /// What every pixel sees beside the subjects, and which pixels see a subject.
 fn look(field: &Field, film: &Film) -> (Vec<Rgb>, Vec<bool>) {
     let pixel = |pixel: usize| {
-        let (points, count) = film.points(&field.bodies, pixel);
-        let mut sum = Rgb::ZERO;
-        for direction in film.directions(pixel, count) {
-            if !matches!(field.bodies.first(film.eye, direction, None), Some((_, Body::Sphere(_)))) {
-                sum += field.background(film.eye, direction, film.sample_angle());
-            }
-        }
-        (sum / count as f32, !points.is_empty())
+        let (directions, share) = beside_subjects(field, film, pixel);
+        let radiance = |d: DVec3| field.background(film.eye, d, film.sample_angle());
+        let sees_subject = !film.subject_points(&field.bodies, pixel, SUBSAMPLES).is_empty();
+        (directions.into_iter().map(radiance).sum::<Rgb>() * share, sees_subject)
     };
     (0..film.size * film.size).into_par_iter().map(pixel).unzip()
+}
+
+/// The directions through a pixel's sub-pixel positions that meet no subject, and the share of the pixel that each stands for.
+fn beside_subjects(field: &Field, film: &Film, pixel: usize) -> (Vec<DVec3>, f32) {
+    let (points, count) = film.points(&field.bodies, pixel);
+    let count = if points.is_empty() && is_edge(field, film, pixel) { EDGE_SUBSAMPLES } else { count };
+    let is_beside = |d: &DVec3| !matches!(field.bodies.first(film.eye, *d, None), Some((_, Body::Sphere(_))));
+    let directions: Vec<DVec3> = film.directions(pixel, count).filter(is_beside).collect();
+    // Subjects that the first positions missed have no pixel: what is beside them fills it.
+    let parts = if points.is_empty() { directions.len() as u32 } else { count };
+    (directions, 1.0 / parts.max(1) as f32)
+}
+
+/// Luminances on the checkerboard lie on two sides of an edge where one is more than this multiple of the other.
+const EDGE_CONTRAST: f32 = 1.02;
+
+/// Whether an edge of the checkerboard, of its squares or of a shadow crosses a pixel.
+fn is_edge(field: &Field, film: &Film, pixel: usize) -> bool {
+    let on_board = |d| match field.bodies.first(film.eye, d, None) {
+        Some((_, Body::Plane)) => Some(luminance(field.background(film.eye, d, 0.0).truncate().to_array())),
+        _ => None,
+    };
+    let seen: Vec<Option<f32>> = film.directions(pixel, SUBSAMPLES).map(on_board).collect();
+    let on_board = || seen.iter().flatten().copied();
+    let (least, most) = (on_board().fold(f32::MAX, f32::min), on_board().fold(0.0, f32::max));
+    let number = on_board().count();
+    (number > 0 && number < seen.len()) || most > EDGE_CONTRAST * least
 }
 
 /// The radial mask of every sphere.

@@ -16,7 +16,7 @@ use crate::scene::{Illumination, Scene};
 
 /// To be raised with every change of the renderer that changes a bit of what it prepares: files that an older program
 /// kept are then left alone, and built again.
-const ALGORITHM_VERSION: u32 = 4;
+const ALGORITHM_VERSION: u32 = 5;
 
 /// A scene, its lights and a picture size, with the content of the environment map.
 #[derive(Clone, Debug)]

@@ -167,3 +167,32 @@ fn sunken_spheres_give_finite_pictures() {
         }
     }
 }
+
+/// Root of the mean square difference of two pictures over the range of the first, where neither shows a subject.
+fn off_subject(scene: &Scene, a: &Image, b: &Image) -> f64 {
+    let coverage = scene.coverage(a.width());
+    let free = || coverage.iter().enumerate().filter(|(_, share)| **share == 0.0).map(|(pixel, _)| pixel);
+    let greens = |image: &Image| free().map(|pixel| f64::from(image.pixels()[pixel][1])).collect::<Vec<_>>();
+    let (a, b) = (greens(a), greens(b));
+    let range = a.iter().copied().fold(f64::MIN, f64::max) - a.iter().copied().fold(f64::MAX, f64::min);
+    let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
+    (squares / a.len() as f64).sqrt() / range
+}
+
+#[test]
+fn a_small_picture_is_the_average_of_a_large_one() {
+    const TIMES: usize = 4;
+    let scene = Scene::spheres();
+    let picture = |size| {
+        let renderer = Renderer::prepare(&scene, Illumination::Point, size).unwrap();
+        renderer.render(&material("lambert:diffuse=0"), Part::Full)
+    };
+    let (small, large) = (picture(48), picture(48 * TIMES));
+    let average = Image::from_fn(48, 48, |x, y| {
+        let parts = (0..TIMES * TIMES).map(|k| large.get(x * TIMES + k % TIMES, y * TIMES + k / TIMES));
+        parts.fold([0.0; 3], |sum, part| std::array::from_fn(|c| sum[c] + part[c] / (TIMES * TIMES) as f32))
+    });
+    // The edges of squares and of shadows decide it: sixteen positions in their pixels would leave 0.009.
+    let error = off_subject(&scene, &average, &small);
+    assert!(error < 1.5e-3, "{error}");
+}

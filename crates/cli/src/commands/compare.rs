@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lookmatch_imaging::{Image, Mask, error_map, nrmsd, write};
+use lookmatch_imaging::{Image, Mask, error_map, nrmsd, nrmsd_of_noise, write};
 use lookmatch_materials::Material;
 use lookmatch_rendering::{Illumination, Part, Renderer, Scene};
 use serde_json::json;
@@ -133,11 +133,7 @@ fn floor(source: &View, target: &View, mask: Option<&Mask>) -> anyhow::Result<Op
     let noises: Vec<&Image> = [&source.noise, &target.noise].into_iter().flatten().collect();
     let mut squares = [0.0; 3];
     for noise in &noises {
-        let mut noisy = source.image.clone();
-        for (pixel, noise) in noisy.pixels_mut().iter_mut().zip(noise.pixels()) {
-            (0..3).for_each(|c| pixel[c] += noise[c]);
-        }
-        let share = nrmsd(&source.image, &noisy, mask)?;
+        let share = nrmsd_of_noise(&source.image, noise, mask)?;
         (0..3).for_each(|c| squares[c] += share[c] * share[c]);
     }
     Ok((!noises.is_empty()).then(|| squares.map(f64::sqrt)))

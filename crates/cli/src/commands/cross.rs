@@ -110,6 +110,9 @@ const PAIRS: &[Pair] = &[
 /// Times as many samples where the target's parameters are known.
 const FINER: u32 = 4;
 
+/// Significant digits of parameters on the page.
+const DIGITS: usize = 4;
+
 /// Folder of the pictures and of the numbers, beside the page.
 const FOLDER: &str = "cross-renderer";
 /// Sides in pixels and samples of the pictures that judge, and of those for people.
@@ -394,9 +397,9 @@ impl<'a> Judge<'a> {
         Ok(Match {
             nrmsd: each(&mean)?,
             jod: each(&|image| Ok(jod(&seen, image)?))?,
-            source: source.to_string(),
-            copy: copy.to_string(),
-            probe: probe.to_string(),
+            source: format!("{source:.DIGITS$}"),
+            copy: format!("{copy:.DIGITS$}"),
+            probe: format!("{probe:.DIGITS$}"),
             saturated: entry.saturated.clone(),
             width: width.map(number).transpose()?,
         })
@@ -407,7 +410,8 @@ impl<'a> Judge<'a> {
         let entry = self.probe.found().nth(place).context("the pictured material has no match")?;
         let [source, copy, probe] = self.materials(entry)?;
         let images = [self.picture(&copy)?.0, self.picture(&probe)?.0];
-        let (image, scale) = sheet(&self.picture(&source)?.0, &images)?;
+        let (image, scale) =
+            sheet(&self.picture(&source)?.0, &images, &self.plan.scene.mask(self.plan.size)?)?;
         write_image(path, &image, &[])?;
         Ok(scale)
     }

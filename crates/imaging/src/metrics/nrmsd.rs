@@ -18,6 +18,18 @@ pub fn nrmsd(source: &Image, target: &Image, mask: Option<&Mask>) -> Result<[f64
     nrmsd_pixels(&exact_pixels(source), &exact_pixels(target), weights.as_deref())
 }
 
+/// [`nrmsd`] of a picture and the same with noise added: what is left between pictures of equal materials.
+///
+/// # Errors
+/// As [`nrmsd`].
+pub fn nrmsd_of_noise(picture: &Image, noise: &Image, mask: Option<&Mask>) -> Result<[f64; 3], ImageError> {
+    picture.check_same_size(noise).map_err(|error| error.in_image("picture and noise"))?;
+    let mut noisy = picture.clone();
+    let values = noise.pixels().as_flattened();
+    noisy.pixels_mut().as_flattened_mut().iter_mut().zip(values).for_each(|(value, noise)| *value += noise);
+    nrmsd(picture, &noisy, mask)
+}
+
 /// [`nrmsd`] of pixels held in `f64`, with one weight per pixel or none.
 ///
 /// # Errors
