@@ -10,7 +10,7 @@ Usage: cargo xtask COMMAND
 
 Commands:
   test [--all-renderers]   Check format, lints, tests, documentation and real renderers; stop at the first failure.
-                           Mitsuba and Radiance are installed for it; with --all-renderers all that lookmatch knows
+                           Mitsuba, Cycles and Radiance are installed for it; with --all-renderers all that lookmatch knows
   help                     Print this text
 
 Exit codes: 0 all is well, 1 a step failed, 2 the command line is wrong";

@@ -12,33 +12,25 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd, nrmsd_of_noise};
 use lookmatch_materials::{BlackBody, Material, Role};
 use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
-use lookmatch_search::{
-    Axis, Lattice, Objective, ObjectiveError, Outcome, Point, Problem, Search, SearchError, Survey,
-};
+use lookmatch_search::Problem;
 use lru::LruCache;
 use rayon::prelude::*;
 
 use crate::carry::{Body, SourceLook};
+use crate::cross_match::{CrossMatch, Settled};
 use crate::from_pictures::Pictures;
-use crate::gallery::{Key, Stopped, key};
+use crate::gallery::{Key, key};
 use crate::picture_checks::check_pictures;
 use crate::probe::Noise;
-use crate::settle::Bowl;
 use crate::stage::LIGHTS;
-use crate::strategy::{Counting, Matched, searched};
+use crate::strategy::Matched;
 use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
 use crate::{Entry, Plan, RemapError, Stage};
 
 /// Names of the reference scene under its lights, point and environment.
 const SCENES: [&str; 2] = ["reference-point", "reference-environment"];
-/// Fitness of a candidate that could not be rendered: worse than any picture can be.
-const FAILED: f64 = 1e9;
 /// Times as many samples as the finest candidates have for the source.
 const SOURCE: u32 = 8;
-/// Bowls that are looked into before a search gives up to find the bottom.
-const ROUNDS: usize = 4;
-/// Levels of the last step of a search among noisy candidates.
-const LAST_STEP: u32 = 4;
 /// Memory for looks, in bytes.
 const CAPACITY: usize = 500 << 20;
 /// Pictures with less noise, as a share of their brightness, have none.
@@ -51,7 +43,7 @@ const BODY_STEPS: usize = 3;
 /// The reference scene with materials of other renderers on it, and ours.
 pub struct CrossStage {
     pub(crate) own: Stage,
-    archives: Vec<Archive>,
+    pub(crate) archives: Vec<Archive>,
     pub(crate) sampling: Sampling,
     /// Weights of the subject's pixels: those of the mask, and 0 at silhouettes, where what is behind is nothing but noise.
     pub(crate) weights: Vec<f32>,
@@ -242,7 +234,12 @@ impl CrossStage {
     }
 
     /// Materials of one model as they are seen, with their diffuse pictures if `whole`.
-    fn looks(&self, materials: &[Material], whole: bool, samples: u32) -> Vec<Result<Arc<Look>, String>> {
+    pub(crate) fn looks(
+        &self,
+        materials: &[Material],
+        whole: bool,
+        samples: u32,
+    ) -> Vec<Result<Arc<Look>, String>> {
         let known: Vec<Option<Arc<Look>>> = materials.iter().map(|m| self.known(m, whole, samples)).collect();
         let missing = materials.iter().zip(&known).filter(|(_, known)| known.is_none());
         let missing: Vec<Material> = missing.map(|(material, _)| material.clone()).collect();
@@ -425,151 +422,12 @@ fn noise(takes: &Takes) -> Option<Image> {
     Some(noise)
 }
 
-/// The end of a search.
-pub(crate) struct Settled {
-    pub(crate) best: Point,
-    pub(crate) is_decided: bool,
-    /// Samples of the pictures that decided it.
-    pub(crate) samples: u32,
-}
-
-/// The fitness of target points against one source.
-pub(crate) struct CrossMatch<'a> {
-    pub(crate) plan: &'a Plan,
-    pub(crate) stage: &'a CrossStage,
-    pub(crate) lattice: &'a Lattice,
-    pub(crate) source: SourceLook<'a>,
-    /// How far a look is from the source's.
-    pub(crate) score: &'a (dyn Fn(&Look) -> Score + Sync),
-    /// Points that were compared so far.
-    pub(crate) scores: HashMap<Point, f64>,
-    pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
-}
-
-impl CrossMatch<'_> {
-    fn targets(&self, points: &[Point]) -> Result<Vec<Material>, RemapError> {
-        let target = |p: &Point| self.plan.target_with(&self.source, &self.lattice.values(p), self.body());
-        points.iter().map(target).collect()
-    }
-
-    /// Ours are cheap, and compared with their bodies; those of others are searched without.
-    fn body(&self) -> Body {
-        if self.plan.to.model().renderer.is_none() { Body::Matched } else { Body::Copied }
-    }
-
-    /// Scores of points at a number of samples; those that cannot be rendered score [`FAILED`].
-    fn scored(&self, points: &[Point], samples: u32) -> Result<Vec<Score>, RemapError> {
-        let looks = self.stage.looks(&self.targets(points)?, false, samples);
-        let score = |look: Result<Arc<Look>, String>| match look {
-            Ok(look) => (self.score)(&look),
-            Err(_) => Score { value: FAILED, error: 0.0 },
-        };
-        Ok(looks.into_par_iter().map(score).collect())
-    }
-
-    /// The best point, and whether noise leaves no doubt of it.
-    pub(crate) fn searched(&mut self, problem: &Problem, most: u32) -> Result<Settled, RemapError> {
-        let found = self.by_method(problem)?;
-        if found.fitness >= FAILED {
-            let reasons = self.stage.counts().into_iter().flat_map(|(_, counts)| counts.reasons);
-            return Err(RemapError::Render(
-                reasons.last().unwrap_or_else(|| "no target could be rendered".into()),
-            ));
-        }
-        self.settled(found.best, problem, most)
-    }
-
-    /// Where the search method of the plan ends.
-    fn by_method(&mut self, problem: &Problem) -> Result<Outcome, RemapError> {
-        if self.plan.search != "survey" {
-            return searched(self.plan, problem, self);
-        }
-        // Single steps are lost in noise: the bowl will tell.
-        let is_noisy = self.stage.archives.iter().any(|archive| archive.studio.has_noise());
-        let survey = Survey { last_step: if is_noisy { LAST_STEP } else { 1 }, ..Survey::default() };
-        survey.run(problem, self).map_err(RemapError::Search)
-    }
-
-    /// Renders candidates around the best with more and more samples, until it is known which is the best or the budget ends;
-    /// says which it was.
-    fn settled(&mut self, found: Point, problem: &Problem, most: u32) -> Result<Settled, RemapError> {
-        let model = self.plan.to.model();
-        let is_width = |axis: &Axis| model.parameter(&axis.name).is_ok_and(|p| p.role.is_width());
-        let ratios: Vec<bool> = self.lattice.axes.iter().map(is_width).collect();
-        let mut samples = self.stage.sampling.samples;
-        let mut centre = found;
-        let mut round = 0;
-        for _ in 0..ROUNDS {
-            if (self.stop)() {
-                return Err(stopped());
-            }
-            let bowl = Bowl::around((self.lattice, &ratios), &centre, &problem.bounds, round);
-            let points = bowl.candidates(self.scores.keys());
-            let scores = self.scored(&points, samples)?;
-            if scores.iter().all(|score| score.error == 0.0 || score.value >= FAILED) {
-                // Without noise the best that was seen is the best.
-                return Ok(Settled { best: centre, is_decided: true, samples });
-            }
-            let scored: Vec<(Point, Score)> =
-                points.into_iter().zip(scores).filter(|(_, score)| score.value < FAILED).collect();
-            self.scores.extend(scored.iter().map(|(point, score)| (point.clone(), score.value)));
-            // A fitness is a distance; its square is what has the shape of a bowl.
-            let squares = |(point, Score { value, .. }): (Point, Score)| (point, value * value.abs());
-            let bottom = bowl.bottom(&scored.into_iter().map(squares).collect::<Vec<_>>());
-            centre = bottom.point;
-            if bottom.is_on_side {
-                continue;
-            }
-            if bottom.is_known || samples >= most {
-                return Ok(Settled { best: centre, is_decided: bottom.is_known, samples });
-            }
-            samples = (4 * samples).min(most);
-            round += 1;
-        }
-        Ok(Settled { best: centre, is_decided: false, samples })
-    }
-}
-
-impl Objective for CrossMatch<'_> {
-    fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, ObjectiveError> {
-        let scores = self.scored(points, self.stage.sampling.samples)?;
-        if (self.stop)() {
-            return Err(Box::new(Stopped));
-        }
-        self.scores.extend(points.iter().cloned().zip(scores.iter().map(|score| score.value)));
-        Ok(scores.into_iter().map(|score| score.value).collect())
-    }
-}
-
-impl Counting for CrossMatch<'_> {
-    fn compared(&self) -> usize {
-        self.scores.len()
-    }
-}
-
-fn stopped() -> RemapError {
-    RemapError::Search(SearchError::Objective(Box::new(Stopped)))
-}
-
 impl CrossStage {
-    /// Finds the target of a source point; one that cannot be rendered makes an entry that says so.
+    /// Finds the target of a source point.
+    ///
+    /// # Errors
+    /// [`RemapError::Render`] where the source, or every target, cannot be rendered.
     pub(crate) fn find(
-        &self,
-        plan: &Plan,
-        values: &[f64],
-        problem: &Problem,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Matched, RemapError> {
-        match self.try_find(plan, values, problem, stop) {
-            Err(_) if stop() => Err(stopped()),
-            Err(RemapError::Render(reason)) => {
-                Ok(Matched { best: Point::new(), compared: 0, entry: Entry::failed(values.to_vec(), reason) })
-            }
-            other => other,
-        }
-    }
-
-    fn try_find(
         &self,
         plan: &Plan,
         values: &[f64],

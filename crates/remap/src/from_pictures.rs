@@ -16,7 +16,8 @@ use lookmatch_rendering::Planes;
 use lookmatch_search::{Bounds, Lattice, Point, Problem, SearchError};
 
 use crate::carry::SourceLook;
-use crate::cross::{ByLight, CrossMatch, Look, Score, Settled};
+use crate::cross::{ByLight, Look, Score};
+use crate::cross_match::{CrossMatch, Settled};
 use crate::gallery::Stopped;
 use crate::stage::LIGHTS;
 use crate::{CrossStage, Plan, RemapError};

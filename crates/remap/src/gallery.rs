@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lookmatch_materials::{Material, Role, Value};
-use lookmatch_search::{Lattice, Objective, ObjectiveError, Point};
+use lookmatch_search::{Lattice, Objective, ObjectiveError, Point, SearchError};
 use lru::LruCache;
 use rayon::prelude::*;
 
@@ -103,4 +103,9 @@ impl Objective for Match<'_> {
         let seen = self.stage.known_appearances(&targets);
         Ok(seen.par_iter().map(|seen| self.stage.fitness(self.appearance, seen)).collect())
     }
+}
+
+/// The error of work that was stopped from outside.
+pub(crate) fn stopped() -> RemapError {
+    RemapError::Search(SearchError::Objective(Box::new(Stopped)))
 }

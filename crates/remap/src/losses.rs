@@ -138,7 +138,7 @@ impl Sides {
     }
 }
 
-/// True for what [`crate::plan::carry_over`] copies without a change.
+/// True for what [`crate::carry::carry_over`] copies without a change.
 fn is_handed_over(role: Role) -> bool {
     matches!(role, Role::DiffuseReflectance | Role::ConductorIndex | Role::Extinction)
 }

@@ -9,7 +9,8 @@ use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
 
 use crate::carry::{Body, SourceLook, carry_over};
-use crate::plan::{Plan, Preset, Strategy};
+use crate::options::{Preset, Strategy};
+use crate::plan::Plan;
 use crate::studio::{RendererRecord, Sampling};
 use crate::{RemapError, plan};
 

@@ -11,7 +11,7 @@ use lookmatch_search::{
 use rayon::prelude::*;
 
 use crate::carry::SourceLook;
-use crate::gallery::{Match, Stopped};
+use crate::gallery::{Match, Stopped, stopped};
 use crate::journal::Journal;
 use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{CrossStage, Entry, Plan, Probe, RemapError, Stage, Strategy};
@@ -97,6 +97,13 @@ pub(crate) struct Matched {
     pub(crate) entry: Entry,
 }
 
+impl Matched {
+    /// What is known of a source point that could not be rendered.
+    fn failed(values: &[f64], reason: String) -> Self {
+        Self { best: Point::new(), compared: 0, entry: Entry::failed(values.to_vec(), reason) }
+    }
+}
+
 /// Who looks at the materials.
 enum Eye<'a> {
     Own(Own<'a>),
@@ -119,7 +126,12 @@ impl Eye<'_> {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Matched, RemapError> {
         match self {
-            Self::Cross(stage) => stage.find(plan, values, problem, stop),
+            Self::Cross(stage) => match stage.find(plan, values, problem, stop) {
+                Err(_) if stop() => Err(stopped()),
+                // The others may fare better.
+                Err(RemapError::Render(reason)) => Ok(Matched::failed(values, reason)),
+                found => found,
+            },
             Self::Own(Own { stage, .. }) => {
                 let outcome = search_one(plan, stage, values, problem, stop)?;
                 let entry = entry(plan, stage, problem.lattice, values.to_vec(), &outcome)?;

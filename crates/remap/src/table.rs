@@ -11,7 +11,7 @@ use lookmatch_materials::Material;
 use lookmatch_search::{Bounds, Lattice, Outcome, Point, SearchError};
 use rayon::prelude::*;
 
-use crate::gallery::{Key, Stopped, key};
+use crate::gallery::{Key, key, stopped};
 use crate::projection::{Projection, Sketches};
 use crate::stage::{Appearance, Stage};
 use crate::{Event, Plan, RemapError};
@@ -290,10 +290,6 @@ fn point(lattice: &Lattice, mut place: usize) -> Point {
         .collect();
     point.reverse();
     point
-}
-
-fn stopped() -> RemapError {
-    RemapError::Search(SearchError::Objective(Box::new(Stopped)))
 }
 
 /// True where no source changes what its targets take over.
