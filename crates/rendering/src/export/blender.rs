@@ -18,8 +18,9 @@ pub(super) fn notes(_: &Exported) -> String {
         "`blender --background --python scene.py -- 512` renders all four pictures with 512 samples per pixel (256 if not given);
 so does `python scene.py 512` with `pip install bpy`. Opened in Blender's text editor and run there, it builds the scene and
 renders nothing. Written for Blender 4.2 to 5, tested with 5.0.1.
-Your material goes into the function full_material of scene.py, the same without its specular lobe into diffuse_material;
-or give the nodes of the materials \"subject\" (all pictures are rendered with what those two functions build).
+Your material goes into the function full_material of scene.py, its diffuse reflection alone into diffuse_material (no node
+makes that of a body under a coat: delete the two diffuse pictures then); or give the nodes of the materials
+\"subject\" (all pictures are rendered with what those two functions build).
 The script switches off: denoising, adaptive sampling, clamping, glossy filtering, the light threshold, the wide pixel filter,
 the view transform, and limits on bounces that a converged picture would show.
 Spheres are smooth meshes of {SEGMENTS} x {} segments. A point light's power is 4 pi times its W/sr; its radius is 0.

@@ -27,7 +27,7 @@ def full_material(material, colour):
 
 
 def diffuse_material(material, colour):
-    """EDIT HERE: the same without its specular lobe. For most materials that is a Diffuse BSDF of the body's colour."""
+    """EDIT HERE: the diffuse reflection alone. Under a coat no node makes it: delete the two diffuse pictures then."""
     nodes, links = material.node_tree.nodes, material.node_tree.links
     bsdf = nodes.new("ShaderNodeBsdfDiffuse")
     bsdf.inputs["Color"].default_value = (*colour, 1.0)

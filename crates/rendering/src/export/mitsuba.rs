@@ -16,8 +16,9 @@ pub(super) fn notes(exported: &Exported) -> String {
         "With `pip install mitsuba` (tested with 3.9.1), `python render.py` renders all four pictures; `python render.py 1024` takes
 1024 samples per pixel. By hand: `mitsuba -m scalar_rgb -D light=environment -D material=full -D spp=256 -o full_environment.exr
 scene.xml`; light is point or environment, material is full or diffuse.
-Your material goes into material-full.xml, in place of the bsdf with the id \"subject\"; the same without its specular lobe
-into material-diffuse.xml. Nothing else needs editing.
+Your material goes into material-full.xml, in place of the bsdf with the id \"subject\"; its diffuse reflection alone
+into material-diffuse.xml (no bsdf makes that of a body under a coat: delete the two diffuse pictures then). Nothing else needs
+editing.
 Spheres are analytic, the checkerboard is procedural; intensities are W/sr as they are; the map has Mitsuba's own orientation{}.
 ",
         if exported.rotation == 0.0 { "" } else { ", turned by the scene's rotation" }
@@ -32,7 +33,7 @@ pub(super) fn write(exported: &Exported) -> Result<Vec<File>, SceneError> {
         File::new("material-full.xml", document(&materials(exported, "Edit here: your material."))),
         File::new(
             "material-diffuse.xml",
-            document(&materials(exported, "Edit here: your material without its specular lobe.")),
+            document(&materials(exported, "Edit here: the diffuse reflection of your material alone.")),
         ),
         File::new("render.py", SCRIPT),
     ])

@@ -17,8 +17,10 @@ pub(super) fn text(format: &ExportFormat, exported: &Exported) -> String {
 Render four square pictures of {size} x {size} pixels into this folder:
   full_point.exr           your material under the point light(s) alone
   full_environment.exr     your material under environment.exr alone
-  diffuse_point.exr        optional: the material with the colour of its body but without its
-  diffuse_environment.exr  specular lobe, under the same two lights
+  diffuse_point.exr        optional: the diffuse reflection alone, under the same two lights: what a black
+  diffuse_environment.exr  body takes away. Where a body lies under an interface (plastic, paint), that is
+                           not the material without its highlight: render it again with a black body and
+                           subtract; or leave these two out
 then run
   lookmatch match FOLDER --to MODEL
 
