@@ -31,8 +31,9 @@ fn program(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookmatch"));
     let installed = std::env::var_os("LOOKMATCH_RENDERERS")
         .unwrap_or_else(|| concat!(env!("CARGO_TARGET_TMPDIR"), "/renderers").into());
-    let light = concat!(env!("CARGO_TARGET_TMPDIR"), "/transport");
-    command.current_dir(folder).env("LOOKMATCH_RENDERERS", installed).env("LOOKMATCH_CACHE", light);
+    // Pictures of an earlier run would be found there, and nothing be rendered.
+    let kept = folder.join("kept");
+    command.current_dir(folder).env("LOOKMATCH_RENDERERS", installed).env("LOOKMATCH_CACHE", kept);
     command
 }
 

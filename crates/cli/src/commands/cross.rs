@@ -274,7 +274,8 @@ fn measured(
         Renderer {
             name: hello.name.clone(),
             version: hello.version.clone(),
-            renders: counts.renders,
+            // As many as it needs, whoever rendered them.
+            renders: counts.renders + counts.found,
             waited_s: counts.waited.as_secs_f64(),
             approximations: hello.approximations.clone(),
         }
