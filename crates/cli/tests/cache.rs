@@ -1,7 +1,5 @@
 //! The render database, with a renderer in Python that writes down what it renders. Python's own SQLite looks into the file.
 
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -10,8 +8,6 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value as Json;
 use tempfile::TempDir;
-
-use support::program;
 
 /// A folder with a renderer and a database of its own.
 struct Place {
@@ -56,8 +52,8 @@ impl Place {
     }
 
     fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = program(self.folder.path());
-        command.env("LOOKMATCH_CACHE", self.path("kept")).args(arguments);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lookmatch"));
+        command.current_dir(self.folder.path()).env("LOOKMATCH_CACHE", self.path("kept")).args(arguments);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }

@@ -126,17 +126,23 @@ fn connect(path: &Path) -> Result<Connection, DatabaseError> {
 /// Makes the tables where there are none; the answer is their format.
 fn prepare(connection: &mut Connection) -> rusqlite::Result<i64> {
     connection.busy_timeout(PATIENCE)?;
-    // Must precede everything else: it is the first thing that is written into a new file.
-    connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")?;
+    let format = |connection: &Connection| {
+        connection.pragma_query_value(None, "user_version", |row| row.get::<_, i64>(0))
+    };
+    let found = format(connection)?;
+    if found > FORMAT {
+        return Ok(found);
+    }
+    if found == 0 {
+        // Must precede everything else: it is the first thing that is written into a new file.
+        connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")?;
+    }
     write_ahead(connection)?;
     // In this mode a killed program loses nothing, and a power cut the last pictures at most.
     connection.pragma_update(None, "synchronous", "NORMAL")?;
     connection.pragma_update(None, "foreign_keys", true)?;
     connection.pragma_update(None, "cell_size_check", true)?;
-    let format = |connection: &Connection| {
-        connection.pragma_query_value(None, "user_version", |row| row.get::<_, i64>(0))
-    };
-    if format(connection)? == 0 {
+    if found == 0 {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         // Another program may have been faster.
         if format(&transaction)? == 0 {

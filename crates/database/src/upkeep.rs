@@ -76,7 +76,7 @@ impl Database {
     /// # Errors
     /// Where it cannot be read.
     pub fn list(&self) -> Result<Contents, DatabaseError> {
-        self.done(|connection| {
+        self.run(|connection| {
             let mut statement = connection.prepare(
                 // A damaged description is for `verify`.
                 "SELECT renderer, version, substr(worker, 1, 8), coalesce(s.name, r.scene), light, size, count(*), sum(bytes),
@@ -107,19 +107,19 @@ impl Database {
     /// # Errors
     /// Where the file cannot be used, or is damaged while others use it.
     pub fn verify(&self, observe: Observe) -> Result<Verified, DatabaseError> {
-        let renewed = match self.done(|connection| check_file(connection)) {
+        let renewed = match self.run(|connection| check_file(connection)) {
             Ok(()) => None,
             Err(renewed @ DatabaseError::Renewed { .. }) => Some(renewed.to_string()),
             Err(error) => return Err(error),
         };
-        let ids: Vec<i64> = self.done(|connection| {
+        let ids: Vec<i64> = self.run(|connection| {
             let mut statement = connection.prepare("SELECT id FROM renders ORDER BY id")?;
             statement.query_map([], |row| row.get(0))?.collect()
         })?;
         let mut verified = Verified { pictures: 0, damaged: Vec::new(), renewed };
         for (done, id) in ids.iter().enumerate() {
             observe(done as u64, ids.len() as u64);
-            match self.done(|connection| check_entry(connection, *id))? {
+            match self.run(|connection| check_entry(connection, *id))? {
                 None => verified.pictures += 1,
                 Some(fault) => verified.damaged.push(fault),
             }
@@ -132,7 +132,7 @@ impl Database {
     /// # Errors
     /// Where it cannot be written.
     pub fn shrink(&self, most_bytes: u64) -> Result<Collected, DatabaseError> {
-        self.done(|connection| {
+        self.run(|connection| {
             let (mut removed, mut removed_bytes) = (0, 0);
             loop {
                 let surplus = used(connection)?.saturating_sub(most_bytes);
@@ -148,13 +148,6 @@ impl Database {
             let (pictures, bytes) = (pictures(connection)?, used(connection)?);
             Ok(Collected { removed, removed_bytes, pictures, bytes })
         })
-    }
-
-    /// [`Database::run`] of a database that nobody has left alone yet.
-    fn done<T>(&self, work: impl FnOnce(&mut Connection) -> rusqlite::Result<T>) -> Result<T, DatabaseError> {
-        let closed =
-            || DatabaseError::Damaged { path: self.path().into(), reason: "it was left alone".into() };
-        self.run(work).unwrap_or_else(|| Err(closed()))
     }
 }
 

@@ -216,7 +216,7 @@ fn newer_formats_are_left_alone() {
         error.to_string().contains("format 7") && error.to_string().contains("reads format 1"),
         "{error}"
     );
-    assert_eq!(fs::read(&path).unwrap(), bytes);
+    assert!(fs::read(&path).unwrap() == bytes, "it was changed");
 }
 
 #[test]
@@ -226,7 +226,7 @@ fn the_least_recently_used_go_first() {
     open.keep(0..200);
     thread::sleep(std::time::Duration::from_millis(5));
     assert_eq!(open.found(0..40), 40);
-    let before = fs::metadata(&path).unwrap().len();
+    let before = open.database.list().unwrap().bytes;
     let collected = open.database.shrink(before / 2).unwrap();
     assert!(collected.removed > 50 && collected.pictures > 50, "{collected:?}");
     assert_eq!(collected.removed + collected.pictures, 200);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::bail;
 use bytesize::ByteSize;
@@ -16,14 +17,20 @@ use crate::transport::renders;
 pub(crate) fn run(args: &CacheArgs) -> anyhow::Result<()> {
     let path =
         renders().ok_or_else(|| Usage("the cache is off (LOOKMATCH_CACHE): nothing is kept".into()))?;
-    // To look at what is not there must not make it.
-    let database = match path.exists() {
-        true => Some(Database::open(&path, Arc::new(|text: &str| eprintln!("warning: {text}")))?),
-        false => None,
+    let is_damaged = Arc::new(AtomicBool::new(false));
+    let flag = is_damaged.clone();
+    let warn = move |text: &str| {
+        eprintln!("warning: {text}");
+        flag.store(true, Ordering::Relaxed);
     };
+    // To look at what is not there must not make it.
+    let database = if path.exists() { Some(Database::open(&path, Arc::new(warn))?) } else { None };
     match &args.command {
         CacheCommand::List { json } => list(&path, database.as_ref(), json),
-        CacheCommand::Verify { json } => verify(&path, database.as_ref(), json),
+        CacheCommand::Verify { json } => {
+            verify(&path, database.as_ref(), json)?;
+            if is_damaged.load(Ordering::Relaxed) { bail!("the database was damaged") } else { Ok(()) }
+        }
         CacheCommand::Gc { max_size, json } => shrink(&path, database.as_ref(), *max_size, json),
     }
 }
