@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::Mutex;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -24,7 +25,25 @@ impl Place {
         }
         let place = Self { folder: TempDir::new().unwrap() };
         place.write_worker(0.0, &[]);
+        place.light();
         Some(place)
+    }
+
+    /// Light that all tests share, so that it is prepared once.
+    fn light(&self) {
+        static SHARED: Mutex<()> = Mutex::new(());
+        let shared = Path::new(env!("CARGO_TARGET_TMPDIR")).join("light");
+        {
+            let _one_at_a_time = SHARED.lock();
+            costs(self.remap("light.json", "1").env("LOOKMATCH_CACHE", &shared).output().unwrap());
+        }
+        fs::create_dir(self.path("kept")).unwrap();
+        for file in fs::read_dir(shared).unwrap().map(|file| file.unwrap().path()) {
+            if file.extension().is_some_and(|extension| extension == "transport") {
+                fs::copy(&file, self.path("kept").join(file.file_name().unwrap())).unwrap();
+            }
+        }
+        fs::remove_file(self.path("renders.log")).ok();
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -71,6 +90,19 @@ impl Place {
         let how =
             ["--size", "16", "--start", "fake=python3 worker.py", "--json", "--seed", seed, "-o", output];
         self.command(&[&job[..], &how].concat())
+    }
+
+    /// A single picture by a renderer of some name: what is told of it, and the messages.
+    fn rendering(&self, output: &str, name: &str, cache: &Path) -> (Json, String) {
+        let start = format!("{name}=python3 worker.py");
+        let material = format!("{name}:plastic:colour=0.5/0.25/0,alpha=0.125");
+        let picture =
+            ["render", "reference", "-m", &material, "--size", "16", "--samples", "4", "--seed", "7"];
+        let how = ["--json", "--start", &start, "-o", output];
+        let output =
+            self.command(&[&picture[..], &how].concat()).env("LOOKMATCH_CACHE", cache).output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        (serde_json::from_slice(&output.stdout).unwrap(), stderr(&output))
     }
 
     /// A remap that must succeed: what it tells of the renderer, and its messages.
@@ -154,37 +186,16 @@ fn a_second_remap_renders_nothing() {
 #[test]
 fn single_pictures_are_found_and_readable_by_public_tools() {
     let Some(place) = Place::new() else { return };
-    let render = |output: &str, name: &str| {
-        let start = format!("{name}=python3 worker.py");
-        let material = format!("{name}:plastic:colour=0.5/0.25/0,alpha=0.125");
-        let base = [
-            "render",
-            "reference",
-            "-m",
-            &material,
-            "--samples",
-            "4",
-            "--size",
-            "16",
-            "--seed",
-            "7",
-            "--json",
-        ];
-        let output =
-            place.command(&[&base[..], &["--start", &start, "-o", output]].concat()).output().unwrap();
-        assert!(output.status.success(), "{}", stderr(&output));
-        serde_json::from_slice::<Json>(&output.stdout).unwrap()
-    };
-    let first = render("a.exr", "fake");
+    let first = place.rendering("a.exr", "fake", &place.path("kept")).0;
     // The same renderer by another name.
-    let second = render("b.exr", "other");
+    let second = place.rendering("b.exr", "other", &place.path("kept")).0;
     assert_eq!((&first["is_found"], &second["is_found"]), (&false.into(), &true.into()));
     assert_eq!((&first["samples"], &second["samples"]), (&5.into(), &5.into()));
     let read = |name: &str| lookmatch_imaging::read(&place.path(name)).unwrap();
     assert_eq!(read("a.exr"), read("b.exr"));
     assert_eq!(place.rendered(), 1);
 
-    let row = "SELECT json_array(renderer, version, model, parameters, light, size, samples, seed, created <= last_used, bytes > 300) FROM renders";
+    let row = "SELECT json_array(renderer, version, model, parameters || '', light, size, samples, seed, created <= last_used, bytes > 300) FROM renders";
     let row: Json = serde_json::from_str(place.sql(row)[0].as_str().unwrap()).unwrap();
     let parameters: Json = serde_json::from_str(row[3].as_str().unwrap()).unwrap();
     assert_eq!(parameters, serde_json::json!({"alpha": 0.125, "colour": [0.5, 0.25, 0.0]}));
@@ -361,24 +372,20 @@ fn the_most_recently_used_pictures_stay() {
 #[test]
 fn nothing_is_kept_where_the_user_wants_nothing_kept() {
     let Some(place) = Place::new() else { return };
-    let off = |mut command: Command| {
-        command.env("LOOKMATCH_CACHE", "off");
-        command
-    };
     for _ in 0..2 {
-        let (costs, told) = place.done(off(place.remap("a.json", "1")));
-        assert!(count(&costs, "renders") > 10 && !told.contains("warning"), "{told}");
+        let (picture, told) = place.rendering("a.exr", "fake", Path::new("off"));
+        assert!(picture["is_found"] == false && !told.contains("warning"), "{picture} {told}");
     }
-    let output = off(place.command(&["cache", "list"])).output().unwrap();
+    assert_eq!(place.rendered(), 2);
+    let output = place.command(&["cache", "list"]).env("LOOKMATCH_CACHE", "off").output().unwrap();
     assert!(
         output.status.code() == Some(2) && stderr(&output).contains("LOOKMATCH_CACHE"),
         "{}",
         stderr(&output)
     );
-    assert!(!place.path("kept").exists() && !place.path("off").exists());
     // Looking at what is not there makes nothing.
     assert_eq!(place.pictures(), 0);
-    assert!(!place.path("kept").exists());
+    assert!(!place.database().exists() && !place.path("off").exists());
 }
 
 /// Folders that cannot be used: below a file, of a system that takes no files, read-only, and one whose database is a folder.
@@ -400,10 +407,9 @@ fn a_folder_that_cannot_be_used_is_no_failure() {
     if fs::write(locked.join("try"), "").is_err() {
         folders.push(locked);
     }
-    for folder in folders {
-        let mut command = place.remap("a.json", "1");
-        let (costs, told) = costs(command.env("LOOKMATCH_CACHE", &folder).output().unwrap());
-        assert!(count(&costs, "renders") > 10 && count(&costs, "found") == 0, "{costs}");
+    for (made, folder) in folders.iter().enumerate() {
+        let (picture, told) = place.rendering("a.exr", "fake", folder);
+        assert_eq!((&picture["is_found"], place.rendered()), (&false.into(), made + 1));
         let lines = told.lines().filter(|line| line.starts_with("warning: pictures are not kept: "));
         assert_eq!(lines.count(), 1, "{told}");
         assert!(told.contains(folder.join("renders.sqlite").to_str().unwrap()), "{told}");
