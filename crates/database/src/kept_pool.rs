@@ -1,6 +1,7 @@
 //! The workers of a renderer, and the database that is asked first.
 
 use std::collections::BTreeMap;
+use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -65,16 +66,19 @@ impl KeptPool {
         Ok(())
     }
 
-    /// Pictures in the order of the jobs, found or rendered ([`Pool::render`]). Each is kept as soon as it is there.
+    /// Pictures in the order of the jobs, found or rendered as by [`Pool::render`]. Each is kept as soon as it is there.
     pub fn render(&self, jobs: &[Job]) -> Vec<Result<Shown, RendererError>> {
         let Some(database) = &self.database else {
             let fresh = |picture| Shown { picture, is_found: false };
             return self.pool.render(jobs).into_iter().map(|result| result.map(fresh)).collect();
         };
+        // Two programs that need the same pictures at once would otherwise render each of them at the same moment.
+        let mut order: Vec<usize> = (0..jobs.len()).collect();
+        let program = RandomState::new();
+        order.sort_by_key(|k| program.hash_one(k));
         let next = AtomicUsize::new(0);
         let work = || {
-            let indices = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
-            let indices = indices.take_while(|k| *k < jobs.len());
+            let indices = std::iter::from_fn(|| order.get(next.fetch_add(1, Ordering::Relaxed)).copied());
             indices.map(|k| (k, self.render_one(database, &jobs[k]))).collect::<Vec<_>>()
         };
         // One more than there are workers, so that none of them is idle while a picture is stored.
