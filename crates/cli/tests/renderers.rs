@@ -108,7 +108,7 @@ fn radiances_plastic_is_wards() {
     install("radiance");
     let folder = TempDir::new().unwrap();
     let remap = "remap ward:variant=gmd,specular=0.1,diffuse=0.3 radiance:plastic:specularity=0.1 \
-         --vary source.roughness=0.1:0.3:0.1 --vary target.roughness=0.02:0.5:0.01 --max-samples 256";
+         --vary source.roughness=0.1:0.3:0.2 --vary target.roughness=0.02:0.5:0.01 --max-samples 64";
     comes_back(&entries(folder.path(), remap), |alpha| alpha);
 }
 
