@@ -144,7 +144,7 @@ mod tests {
         let told = Arc::new(Mutex::new(Vec::new()));
         let listener = told.clone();
         let warn: Warn = Arc::new(move |text| listener.lock().unwrap().push(text.to_owned()));
-        let scene = SceneIdentity::new("s", serde_json::Map::new(), &[]);
+        let scene = SceneIdentity::new("s", json!({}), &[]);
         let described = |seed: u32| -> Description {
             serde_json::from_value(json!({
                 "renderer": "r", "version": "1", "worker": "w", "scene": scene.hash, "light": "point", "size": 32,

@@ -1,6 +1,5 @@
 //! All that the pixels of a picture depend on.
 
-use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs::File;
 use std::path::Path;
@@ -28,7 +27,7 @@ pub struct Description {
     /// The material's model.
     pub model: String,
     /// All of its parameters.
-    pub parameters: BTreeMap<String, Value>,
+    pub parameters: Map<String, Value>,
     /// Samples per pixel that were asked for.
     pub samples: u32,
     /// Other seeds, other noise.
@@ -46,15 +45,17 @@ impl Description {
             light: scene.light.clone(),
             size: scene.size,
             model: job.model.clone(),
-            parameters: job.values.iter().map(|(name, value)| (name.clone(), value.clone())).collect(),
+            parameters: job.values.clone(),
             samples: job.samples,
             seed: job.seed,
         }
     }
 
-    /// JSON, fields and parameters always in the same order, numbers to the last bit.
+    /// JSON, names in the order of the alphabet, numbers to the last bit.
     pub fn text(&self) -> String {
-        json!(self).to_string()
+        let mut text = json!(self);
+        text.sort_all_objects();
+        text.to_string()
     }
 
     /// For a message to people.
@@ -81,17 +82,19 @@ pub struct SceneIdentity {
 
 impl SceneIdentity {
     /// From the message to workers ([`lookmatch_renderers::Pool::told`]) and the pixels of the map.
-    pub fn new(name: &str, mut message: Map<String, Value>, map: &[u8]) -> Self {
-        let size = message.remove("size").and_then(|size| size.as_u64()).unwrap_or(0);
+    pub fn new(name: &str, mut message: Value, map: &[u8]) -> Self {
+        let size = message["size"].as_u64().unwrap_or(0);
+        message.as_object_mut().and_then(|fields| fields.remove("size"));
         let mut lights = Vec::new();
-        if message.get("point_lights").and_then(Value::as_array).is_some_and(|points| !points.is_empty()) {
+        if message["point_lights"].as_array().is_some_and(|points| !points.is_empty()) {
             lights.push("point");
         }
-        if let Some(Value::Object(environment)) = message.get_mut("environment") {
+        if let Value::Object(environment) = &mut message["environment"] {
             lights.push("environment");
             environment.insert("pixels".into(), blake3::hash(map).to_hex().as_str().into());
         }
-        let content = Value::Object(message).to_string();
+        message.sort_all_objects();
+        let content = message.to_string();
         let hash = blake3::hash(content.as_bytes()).to_hex().to_string();
         Self { name: name.into(), hash, content, light: lights.join(", "), size }
     }

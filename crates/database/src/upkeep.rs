@@ -1,11 +1,15 @@
 //! What people do with the database: list what is in it, verify it, make it smaller.
 
 use rusqlite::ffi::{self, SQLITE_CORRUPT};
-use rusqlite::{Connection, TransactionBehavior, params};
+use rusqlite::{Connection, TransactionBehavior};
 use serde::Serialize;
 
 use crate::entry::Entry;
 use crate::{Database, DatabaseError};
+
+/// Pictures that are removed, and pages that are given back, before others may write.
+const BATCH: usize = 1000;
+const PAGES: usize = 10_000;
 
 /// What is in a database.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -188,23 +192,21 @@ fn check_entry(connection: &Connection, id: i64) -> rusqlite::Result<Option<Stri
     Ok(fault)
 }
 
-/// Removes as many as have so many bytes together; the answer is their number and their bytes.
+/// Removes the oldest, as many as have so many bytes together, or a batch; the answer is their number and their bytes.
 fn remove_oldest(connection: &mut Connection, bytes: u64) -> rusqlite::Result<(u64, u64)> {
     let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
     let (mut count, mut sum) = (0, 0);
     {
-        let mut oldest = transaction.prepare("SELECT id, bytes FROM renders ORDER BY last_used, id")?;
-        let mut rows = oldest.query([])?;
-        let mut ids = Vec::new();
-        while let Some(row) = rows.next()?
-            && sum < bytes
-        {
-            ids.push(row.get::<_, i64>(0)?);
-            sum += row.get::<_, u64>(1)?;
-        }
+        let mut oldest =
+            transaction.prepare("SELECT id, bytes FROM renders ORDER BY last_used, id LIMIT ?1")?;
+        let row = |row: &rusqlite::Row| Ok((row.get::<_, i64>(0)?, row.get::<_, u64>(1)?));
+        let oldest = oldest.query_map([BATCH], row)?.collect::<Result<Vec<_>, _>>()?;
         let mut remove = transaction.prepare("DELETE FROM renders WHERE id = ?1")?;
-        for id in ids {
-            count += remove.execute(params![id])? as u64;
+        for (id, size) in oldest {
+            if sum < bytes {
+                count += remove.execute([id])? as u64;
+                sum += size;
+            }
         }
     }
     transaction.commit()?;
@@ -213,9 +215,17 @@ fn remove_oldest(connection: &mut Connection, bytes: u64) -> rusqlite::Result<(u
 
 /// Returns empty pages to the file system, and empties the log where nobody reads it.
 fn give_back(connection: &Connection) -> rusqlite::Result<()> {
-    // One step for each page.
-    let mut statement = connection.prepare("PRAGMA incremental_vacuum")?;
-    let mut rows = statement.query([])?;
-    while rows.next()?.is_some() {}
+    let free = || connection.pragma_query_value(None, "freelist_count", |row| row.get::<_, u64>(0));
+    let mut statement = connection.prepare(&format!("PRAGMA incremental_vacuum({PAGES})"))?;
+    let mut left = free()?;
+    while left > 0 {
+        // One step for each page.
+        let mut rows = statement.query([])?;
+        while rows.next()?.is_some() {}
+        let before = std::mem::replace(&mut left, free()?);
+        if left >= before {
+            break;
+        }
+    }
     connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
 }

@@ -1,6 +1,5 @@
 //! The database by itself: keys, round trips, threads, damage.
 
-use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +17,7 @@ fn scene(name: &str, size: u64, radius: f64, map: &[u8]) -> SceneIdentity {
         "size": size, "spheres": [{"centre": [0, 0, 0], "radius": radius}], "point_lights": [],
         "environment": {"width": 2, "height": 1},
     });
-    SceneIdentity::new(name, message.as_object().unwrap().clone(), map)
+    SceneIdentity::new(name, message, map)
 }
 
 fn description(seed: u32) -> Description {
@@ -30,10 +29,7 @@ fn description(seed: u32) -> Description {
         light: "environment".into(),
         size: 4,
         model: "plastic".into(),
-        parameters: BTreeMap::from([
-            ("alpha".to_owned(), json!(0.1)),
-            ("colour".to_owned(), json!([0.1, 0.2, 0.3])),
-        ]),
+        parameters: json!({"alpha": 0.1, "colour": [0.1, 0.2, 0.3]}).as_object().unwrap().clone(),
         samples: 16,
         seed,
     }
@@ -134,8 +130,9 @@ fn everything_that_pixels_depend_on_is_in_the_key() {
 #[test]
 fn parameters_may_come_in_any_order() {
     let order = |names: [&str; 2]| {
-        let values: Map<String, Value> = names.iter().map(|name| ((*name).to_owned(), json!(1))).collect();
-        Description { parameters: values.into_iter().collect(), ..description(0) }.text()
+        let parameters: Map<String, Value> =
+            names.iter().map(|name| ((*name).to_owned(), json!(1))).collect();
+        Description { parameters, ..description(0) }.text()
     };
     assert_eq!(order(["a", "b"]), order(["b", "a"]));
 }

@@ -177,12 +177,12 @@ impl Pool {
         Ok(())
     }
 
-    /// What workers are told of a scene, but for its name: the message, and the pixels of its map.
-    pub fn told(&self, scene: &str) -> Option<(Map<String, Value>, Arc<[u8]>)> {
+    /// What workers are told of a scene, but for its name: the message, a JSON object, and the bytes of its map.
+    pub fn told(&self, scene: &str) -> Option<(Value, Arc<[u8]>)> {
         let data = lock(&self.scenes).get(scene).cloned()?;
         let mut message = data.message.clone();
         message.remove("scene");
-        Some((message, data.data.clone()))
+        Some((message.into(), data.data.clone()))
     }
 
     /// Renders pictures, the results in the order of the jobs. One that fails is repeated on a fresh worker, and only then
