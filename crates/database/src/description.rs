@@ -89,7 +89,7 @@ impl SceneIdentity {
         if message["point_lights"].as_array().is_some_and(|points| !points.is_empty()) {
             lights.push("point");
         }
-        if let Value::Object(environment) = &mut message["environment"] {
+        if let Some(Value::Object(environment)) = message.get_mut("environment") {
             lights.push("environment");
             environment.insert("pixels".into(), blake3::hash(map).to_hex().as_str().into());
         }
