@@ -452,11 +452,15 @@ pub(crate) enum CacheCommand {
     /// Remove the pictures that were not used for longest
     Gc {
         /// Bytes that the database may have: 500MB, 2GiB
-        #[arg(long, value_name = "SIZE")]
+        #[arg(long, value_name = "SIZE", value_parser = byte_size)]
         max_size: ByteSize,
         #[command(flatten)]
         json: Json,
     },
+}
+
+fn byte_size(text: &str) -> Result<ByteSize, String> {
+    text.parse().map_err(|_| "expected bytes with or without a unit: 500MB, 1.5GiB, 1000000".to_owned())
 }
 
 #[derive(Args)]

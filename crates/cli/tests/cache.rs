@@ -365,7 +365,8 @@ fn the_most_recently_used_pictures_stay() {
     assert_eq!(place.pictures(), 0);
     for wrong in ["much", "-1MB", "5 apples"] {
         let output = place.cache(&["gc", &format!("--max-size={wrong}")]);
-        assert!(output.status.code() == Some(2) && stderr(&output).contains(wrong), "{}", stderr(&output));
+        let told = stderr(&output);
+        assert!(output.status.code() == Some(2) && told.contains(wrong) && told.contains("500MB"), "{told}");
     }
 }
 

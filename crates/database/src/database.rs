@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lookmatch_renderers::Picture;
 use rusqlite::{Connection, TransactionBehavior, params};
@@ -96,8 +96,7 @@ impl Database {
         &self,
         work: impl FnOnce(&mut Connection) -> rusqlite::Result<T>,
     ) -> Result<T, DatabaseError> {
-        // A panic elsewhere leaves at worst a transaction behind, which SQLite takes back.
-        self.open.lock().unwrap_or_else(PoisonError::into_inner).run(work)
+        self.lock().run(work)
     }
 
     /// [`Database::run`] for what changes nothing.
@@ -117,17 +116,28 @@ impl Database {
         loss: &str,
         work: impl FnOnce(&mut Connection) -> rusqlite::Result<T>,
     ) -> Option<T> {
+        let mut open = self.lock();
+        // Who had the lock before may have waited in vain for other programs.
         if is_lost.load(Ordering::Relaxed) {
             return None;
         }
-        match self.run(work) {
+        let error = match open.run(work) {
             Ok(value) => return Some(value),
-            Err(renewed @ DatabaseError::Renewed { .. }) => (self.warn)(&renewed.to_string()),
-            // Of several threads, one tells it.
-            Err(error) if !is_lost.swap(true, Ordering::Relaxed) => (self.warn)(&format!("{loss}: {error}")),
-            Err(_) => {}
+            Err(error) => error,
+        };
+        match error {
+            DatabaseError::Renewed { .. } => (self.warn)(&error.to_string()),
+            _ => {
+                is_lost.store(true, Ordering::Relaxed);
+                (self.warn)(&format!("{loss}: {error}"));
+            }
         }
         None
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Open> {
+        // A panic elsewhere leaves at worst a transaction behind, which SQLite takes back.
+        self.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

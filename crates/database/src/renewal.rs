@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rusqlite::{Connection, ErrorCode, OpenFlags, TransactionBehavior, params};
 
@@ -15,8 +15,8 @@ use crate::error::is_damage;
 
 /// Format of the tables; `PRAGMA user_version`.
 const FORMAT: i64 = 1;
-/// How long to wait for others to finish writing: a large `gc` takes seconds.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// How long to wait for others to finish writing, which takes them a fraction of a second.
+const PATIENCE: Duration = Duration::from_secs(20);
 /// Pictures that are saved in one transaction.
 const BATCH: usize = 256;
 
@@ -157,14 +157,18 @@ fn prepare(connection: &mut Connection) -> rusqlite::Result<i64> {
 /// Readers and a writer do not wait for each other. Of several programs that want to change the mode of a new file at once, SQLite
 /// turns some away without waiting.
 fn write_ahead(connection: &Connection) -> rusqlite::Result<()> {
-    let pause = Duration::from_millis(20);
-    for _ in 0..PATIENCE.as_millis() / pause.as_millis() {
+    let begin = Instant::now();
+    loop {
         match connection.pragma_update(None, "journal_mode", "WAL") {
-            Err(error) if error.sqlite_error_code() == Some(ErrorCode::DatabaseBusy) => sleep(pause),
+            Err(error)
+                if error.sqlite_error_code() == Some(ErrorCode::DatabaseBusy)
+                    && begin.elapsed() < PATIENCE =>
+            {
+                sleep(Duration::from_millis(20));
+            }
             done => return done,
         }
     }
-    connection.pragma_update(None, "journal_mode", "WAL")
 }
 
 /// Copies what is intact; the answer is the number of pictures.

@@ -15,8 +15,9 @@ use crate::output::{bar, print, print_json, table};
 use crate::transport::renders;
 
 pub(crate) fn run(args: &CacheArgs) -> anyhow::Result<()> {
-    let path =
-        renders().ok_or_else(|| Usage("the cache is off (LOOKMATCH_CACHE): nothing is kept".into()))?;
+    let path = renders().ok_or_else(|| {
+        Usage("there is no cache: LOOKMATCH_CACHE is off, or the system names no folder for it".into())
+    })?;
     let is_damaged = Arc::new(AtomicBool::new(false));
     let flag = is_damaged.clone();
     let warn = move |text: &str| {
