@@ -122,12 +122,12 @@ fn microfacets_travel_between_mitsuba_and_cycles() {
             format!("mitsuba:roughconductor:distribution={theirs},eta=0,k=1,specular_reflectance=1");
         let cycles = format!("cycles:glossy:distribution={ours},color=1");
         let there = format!(
-            "remap {mitsuba} {cycles} --vary source.alpha=0.1:0.4:0.15 --vary target.roughness=0.1:0.85:0.01 \
+            "remap {mitsuba} {cycles} --vary source.alpha=0.1:0.4:0.3 --vary target.roughness=0.1:0.85:0.01 \
              --max-samples 256"
         );
         comes_back(&entries(folder.path(), &there), f64::sqrt);
         let back = format!(
-            "remap {cycles} {mitsuba} --vary source.roughness=0.3:0.7:0.2 --vary target.alpha=0.02:0.7:0.01 \
+            "remap {cycles} {mitsuba} --vary source.roughness=0.3:0.7:0.4 --vary target.alpha=0.02:0.7:0.01 \
              --max-samples 256"
         );
         comes_back(&entries(folder.path(), &back), |roughness| roughness * roughness);
