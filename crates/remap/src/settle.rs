@@ -4,6 +4,8 @@
 //! the best form a bowl, and all of them together tell where its bottom is: a quadratic in the parameters, fitted by least squares
 //! (the response surface of Box and Wilson 1951). Its own standard error says whether more samples are needed.
 
+use std::cmp::Ordering;
+
 use lookmatch_search::{Bounds, Lattice, Point, spread};
 use nalgebra::{DMatrix, DVector};
 
@@ -104,7 +106,7 @@ impl<'a> Bowl<'a> {
         };
         let fit = &inverse * design.transpose() * &scores;
         let residual = (&scores - &design * &fit).norm_squared() / freedom as f64;
-        // The bottom of a x² + b x lies at −b/2a, and is as uncertain as b.
+        // Along its own axis the bottom of a x² + b x lies at −b/2a, and is as uncertain as b.
         let error = |k: usize| {
             let (slope, curve) = (1 + k, 1 + self.axes.len() + k);
             let error = (residual * inverse[(slope, slope)]).sqrt();
@@ -123,8 +125,29 @@ impl<'a> Bowl<'a> {
         });
         let point = least.unwrap_or_else(best);
         let is_on_side = self.is_on_side(&point);
-        let is_known = self.is_narrow && !is_on_side && (0..self.axes.len()).all(|k| error(k) < KNOWN);
+        let is_known =
+            self.is_narrow && !is_on_side && self.largest_error(&fit, &(inverse * residual)) < KNOWN;
         Bottom { point, is_known, is_on_side }
+    }
+
+    /// The standard error of the bottom in levels, along the axis where it is largest, from the coefficients and their covariance.
+    ///
+    /// The bottom of b·x + xᵀH x/2 lies at −H⁻¹b; its covariance is H⁻¹ Cov(b) H⁻¹. So a valley across the axes, a rougher lobe that is
+    /// as much brighter, is as long as it is, however steep its sides.
+    fn largest_error(&self, fit: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
+        let count = self.axes.len();
+        let product = |i: usize, j: usize| fit[1 + 2 * count + i * (i - 1) / 2 + j];
+        let curvature = DMatrix::from_fn(count, count, |i, j| match i.cmp(&j) {
+            Ordering::Equal => 2.0 * fit[1 + count + i],
+            Ordering::Greater => product(i, j),
+            Ordering::Less => product(j, i),
+        });
+        let Some(solved) = curvature.cholesky() else { return f64::INFINITY };
+        let slopes = covariance.view((1, 1), (count, count)).into_owned();
+        let across = solved.solve(&slopes).transpose();
+        let places = solved.solve(&across);
+        let levels = (0..count).map(|k| places[(k, k)].sqrt() / self.level(self.axes[k]));
+        levels.fold(0.0, f64::max)
     }
 
     /// 1, x, x², and products.
@@ -231,6 +254,23 @@ mod tests {
         let off = noisy.point.iter().zip([1, 31, 22]).map(|(a, b)| a.abs_diff(b)).max().unwrap();
         assert!(off <= 2 && !noisy.is_known, "{:?}", noisy.point);
         assert!(!found(100.0, 1).is_known);
+    }
+
+    #[test]
+    fn a_valley_across_the_axes_is_as_long_as_it_is() {
+        let lattice = lattice();
+        let bowl = Bowl::around((&lattice, &[false; 3]), &vec![1, 30, 30], &Bounds::full(&lattice), 1);
+        let bottom = |length: f64| {
+            let valley = |p: &Point| {
+                let [a, b] = [f64::from(p[1]) - 30.0, f64::from(p[2]) - 30.0];
+                let noise = f64::from((p[1] * 7919 + p[2] * 104_729 + 13) % 1009) / 1009.0 - 0.5;
+                (a - b).powi(2) + (a + b).powi(2) / length.powi(2) + noise
+            };
+            let scored: Vec<(Point, f64)> =
+                bowl.candidates(std::iter::empty()).into_iter().map(|p| (p.clone(), valley(&p))).collect();
+            bowl.bottom(&scored)
+        };
+        assert!(bottom(1.0).is_known && !bottom(30.0).is_known);
     }
 
     #[test]
