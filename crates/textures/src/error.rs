@@ -52,6 +52,11 @@ impl TextureError {
         }
     }
 
+    /// True for a map that was given up because of another one.
+    pub(crate) fn is_given_up(&self) -> bool {
+        matches!(self, Self::Io { source, .. } if source.kind() == io::ErrorKind::Interrupted)
+    }
+
     pub(crate) fn undecodable(path: &Path, reason: impl ToString) -> Self {
         Self::Undecodable { path: path.into(), reason: reason.to_string() }
     }

@@ -132,7 +132,8 @@ impl Bands for PngBands {
         self.row.resize(self.width * self.samples * bytes, 0);
         for y in rows {
             if let Some(whole) = &self.whole {
-                self.row.copy_from_slice(&whole[y * self.row.len()..(y + 1) * self.row.len()]);
+                let length = self.row.len();
+                self.row.copy_from_slice(&whole[y * length..(y + 1) * length]);
             } else {
                 debug_assert_eq!(y, self.next, "rows come from top to bottom");
                 let mut row = std::mem::take(&mut self.row);
@@ -186,7 +187,8 @@ pub(super) fn write(
     if sheet.is_srgb && metadata.icc.is_none() {
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     }
-    let mut writer = encoder.write_header()?.into_stream_writer_with_size(1 << 18)?;
+    let mut file = encoder.write_header()?;
+    let mut writer = file.stream_writer_with_size(1 << 18)?;
     let mut pieces = Pieces::new(sheet, bands);
     let mut bytes = Vec::new();
     while let Some(ready) = pieces.next(16)? {
@@ -204,7 +206,8 @@ pub(super) fn write(
             writer.write_all(&bytes)?;
         }
     }
-    Ok(writer.finish()?)
+    writer.finish()?;
+    Ok(file.finish()?)
 }
 
 /// PNG specification, section 11.3.3: keywords have 1 to 79 Latin-1 characters, and zero ends a text.
