@@ -183,12 +183,12 @@ pub(super) fn write(
             info.utf8_text.push(ITXtChunk::new(key, text));
         }
     }
-    let mut encoder = png::Encoder::with_info(out, info)?;
+    let mut encoder = png::Encoder::with_info(out, info).map_err(plain)?;
     if sheet.is_srgb && metadata.icc.is_none() {
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     }
-    let mut file = encoder.write_header()?;
-    let mut writer = file.stream_writer_with_size(1 << 18)?;
+    let mut file = encoder.write_header().map_err(plain)?;
+    let mut writer = file.stream_writer_with_size(1 << 18).map_err(plain)?;
     let mut pieces = Pieces::new(sheet, bands);
     let mut bytes = Vec::new();
     while let Some(ready) = pieces.next(16)? {
@@ -206,8 +206,16 @@ pub(super) fn write(
             writer.write_all(&bytes)?;
         }
     }
-    writer.finish()?;
-    Ok(file.finish()?)
+    writer.finish().map_err(plain)?;
+    file.finish().map_err(plain)
+}
+
+/// The system's own error: the crate's conversion hides its kind, a full disk for one.
+fn plain(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
 }
 
 /// PNG specification, section 11.3.3: keywords have 1 to 79 Latin-1 characters, and zero ends a text.
