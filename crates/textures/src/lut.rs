@@ -2,8 +2,11 @@
 //!
 //! A cell of the table holds the coefficients of its polynomial in the fractions, `a + b x + c y + d x y`, for four outputs
 //! side by side: one texel is four vector loads and three multiply-adds, without a gather. Where texels lie in the grid is
-//! found first, for a block of them: one vector operation per axis with regular levels; a look-up in a guide, which tells the
-//! interval to start from, for axes with irregular ones. Both are exact but for the rounding of `f32`.
+//! found first, for a block of them: by a division where the levels of an axis are regular; where they are not, the division finds
+//! one of many short bins, and a comparison tells on which side of the bin's level. Nothing is resampled, so both are exact but for
+//! the rounding of `f32`.
+
+use std::ops::Range;
 
 use fearless_simd::{Level, dispatch, f32x4, prelude::*};
 
@@ -16,7 +19,7 @@ const BLOCK: usize = 256;
 /// Cells that indices in `f32` count exactly.
 const MAX_CELLS: usize = 1 << 22;
 /// Bins of a guide at most.
-const MAX_BINS: usize = 4096;
+const MAX_BINS: usize = 1 << 20;
 
 /// How an output behaves between the levels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +45,7 @@ struct Group {
     /// The outputs in its lanes.
     lanes: Vec<usize>,
     /// By cell: coefficients (linear) or corners (nearest), each of four lanes.
-    cells: Vec<f32>,
+    cells: Vec<[f32; LANES]>,
 }
 
 /// What can be wrong with a table.
@@ -54,6 +57,9 @@ pub enum LutError {
     /// Levels that do not increase, or are not finite.
     #[error("the levels of input {0} do not increase")]
     Levels(usize),
+    /// Levels of which some are a millionth of the whole apart.
+    #[error("the levels of input {0} are too uneven: the closest must be a millionth of their range apart")]
+    Uneven(usize),
     /// The number of values is not that of the grid's points.
     #[error("the grid has {expected} points; output {output} has {found} values")]
     Values {
@@ -98,11 +104,12 @@ impl Lut {
             }
         }
         let mut stride = cells;
-        let axes = levels.iter().map(|l| {
+        let axes = levels.iter().enumerate().map(|(axis, l)| {
             stride /= intervals(l);
-            Places::new(l, stride as f32)
+            // Multiples of a power of two: as exact in `f32` as the cells' numbers.
+            Places::new(l, (stride << levels.len()) as f32).ok_or(LutError::Uneven(axis))
         });
-        let axes = axes.collect();
+        let axes = axes.collect::<Result<_, _>>()?;
         let mut groups = Vec::new();
         for between in [Between::Linear, Between::Nearest] {
             let members: Vec<usize> = (0..outputs.len()).filter(|o| outputs[*o].0 == between).collect();
@@ -158,11 +165,11 @@ fn tabulate(
     outputs: &[(Between, Vec<f64>)],
     lanes: &[usize],
     between: Between,
-) -> Vec<f32> {
+) -> Vec<[f32; LANES]> {
     let corners = 1 << levels.len();
     let cells: usize = levels.iter().map(|l| intervals(l)).product();
-    let mut table = vec![0.0; cells * corners * LANES];
-    for (cell, table) in table.chunks_exact_mut(corners * LANES).enumerate() {
+    let mut table = vec![[0.0; LANES]; cells * corners];
+    for (cell, table) in table.chunks_exact_mut(corners).enumerate() {
         for (lane, output) in lanes.iter().enumerate() {
             let value = |corner| outputs[*output].1[point(levels, cell, corner)];
             let mut values: Vec<f64> = (0..corners).map(value).collect();
@@ -175,7 +182,7 @@ fn tabulate(
                 }
             }
             for (corner, value) in values.iter().enumerate() {
-                table[corner * LANES + lane] = *value as f32;
+                table[corner][lane] = *value as f32;
             }
         }
     }
@@ -199,87 +206,95 @@ fn point(levels: &[Vec<f64>], cell: usize, corner: usize) -> usize {
 struct Places {
     /// First and last level.
     range: [f32; 2],
-    /// Intervals or bins per unit.
+    /// Intervals, or bins of the guide, per unit.
     scale: f32,
-    /// The last interval or bin.
+    /// The last of them.
     last: f32,
-    /// What an interval adds to the index of a cell.
+    /// What an interval adds to the place of a cell.
     stride: f32,
     /// For irregular levels.
-    guide: Option<Guide>,
+    guide: Vec<Bin>,
 }
 
-/// The intervals of irregular levels, and where to start looking for a value's.
-#[derive(Clone, Debug)]
-struct Guide {
-    /// By bin, the interval of its lower end.
-    first: Vec<u32>,
-    /// By interval: its lower end, one over its length, its upper end.
-    intervals: Vec<[f32; 3]>,
+/// A part of an axis that is short enough to have one level in it, or none.
+#[derive(Clone, Copy, Debug)]
+struct Bin {
+    /// The level.
+    split: f32,
+    /// For values below and from the level on: lower end of their interval, one over its length, its place.
+    sides: [[f32; 3]; 2],
 }
 
 impl Places {
-    fn new(levels: &[f64], stride: f32) -> Self {
+    fn new(levels: &[f64], stride: f32) -> Option<Self> {
         let (min, max) = (levels[0], levels[levels.len() - 1]);
-        let range = [min as f32, max as f32];
         let count = intervals(levels);
         let step = (max - min) / count as f64;
         let is_regular =
             levels.iter().enumerate().all(|(i, v)| (v - min - i as f64 * step).abs() <= 1e-9 * step);
-        let scale = |count: usize| if max > min { (count as f64 / (max - min)) as f32 } else { 0.0 };
-        if is_regular {
-            let last = (count - 1) as f32;
-            return Self { range, scale: scale(count), last, stride, guide: None };
-        }
-        let smallest = levels.windows(2).map(|p| p[1] - p[0]).fold(f64::INFINITY, f64::min);
-        let bins = (((max - min) / smallest).ceil() as usize).clamp(count, MAX_BINS);
-        let lower = |bin: usize| min + (max - min) * bin as f64 / bins as f64;
-        // One bin early: rounding may put a value into the bin above its own.
-        let first = (0..bins).map(|bin| {
-            let below = levels.partition_point(|level| *level <= lower(bin.saturating_sub(1)));
-            (below.max(1) - 1).min(count - 1) as u32
-        });
-        let interval = |p: &[f64]| [p[0] as f32, (1.0 / (p[1] - p[0])) as f32, p[1] as f32];
-        let guide = Guide { first: first.collect(), intervals: levels.windows(2).map(interval).collect() };
-        Self { range, scale: scale(bins), last: (bins - 1) as f32, stride, guide: Some(guide) }
+        let guide = if is_regular { Vec::new() } else { guide(levels, stride)? };
+        let parts = if is_regular { count } else { guide.len() };
+        Some(Self {
+            range: [min as f32, max as f32],
+            scale: if max > min { (parts as f64 / (max - min)) as f32 } else { 0.0 },
+            last: (parts - 1) as f32,
+            stride,
+            guide,
+        })
     }
 
     /// Writes the fractions of some values, and adds their intervals to the cells.
     #[inline(always)]
     fn find<S: Simd>(&self, simd: S, values: &[f32], fractions: &mut [f32; BLOCK], cells: &mut [f32; BLOCK]) {
         let splat = |v: f32| S::f32s::splat(simd, v);
+        let (min, max, stride) = (splat(self.range[0]), splat(self.range[1]), splat(self.stride));
+        let (scale, last) = (splat(self.scale), splat(self.last));
         let width = S::f32s::LEN;
-        let mut padded = [self.range[0]; BLOCK];
-        padded[..values.len()].copy_from_slice(values);
-        let (min, max, scale) = (splat(self.range[0]), splat(self.range[1]), splat(self.scale));
-        let (last, stride) = (splat(self.last), splat(self.stride));
+        let (mut inside, mut bins) = ([0.0; BLOCK], [0; BLOCK]);
         for first in (0..BLOCK).step_by(width) {
             let lanes = first..first + width;
-            let value = S::f32s::from_slice(simd, &padded[lanes.clone()]).max(min).min(max);
+            // A NaN becomes a level: it must not become an index.
+            let value = S::f32s::from_slice(simd, &values[lanes.clone()]).max_precise(min).min(max);
             let position = (value - min) * scale;
-            let interval = position.floor().min(last);
-            if self.guide.is_none() {
-                (position - interval).store_slice(&mut fractions[lanes.clone()]);
+            let part = position.floor().min(last);
+            if self.guide.is_empty() {
+                (position - part).store_slice(&mut fractions[lanes.clone()]);
                 let cell = S::f32s::from_slice(simd, &cells[lanes.clone()]);
-                interval.mul_add(stride, cell).store_slice(&mut cells[lanes]);
+                part.mul_add(stride, cell).store_slice(&mut cells[lanes]);
             } else {
-                value.store_slice(&mut padded[lanes.clone()]);
-                interval.store_slice(&mut fractions[lanes]);
+                value.store_slice(&mut inside[lanes.clone()]);
+                part.to_int::<S::u32s>().store_slice(&mut bins[lanes]);
             }
         }
-        let Some(guide) = &self.guide else { return };
-        let last = guide.intervals.len() - 1;
-        for ((value, fraction), cell) in padded.iter().zip(fractions).zip(cells) {
-            // A NaN casts to 0, and no bin lies past the last.
-            let mut index = guide.first[(*fraction as usize).min(guide.first.len() - 1)] as usize;
-            while index < last && *value >= guide.intervals[index][2] {
-                index += 1;
-            }
-            let [lower, inverse, _] = guide.intervals[index];
-            *fraction = (value - lower) * inverse;
-            *cell += index as f32 * self.stride;
+        if self.guide.is_empty() {
+            return;
+        }
+        for texel in 0..BLOCK {
+            let bin = &self.guide[bins[texel] as usize];
+            let [lower, inverse, place] = bin.sides[usize::from(inside[texel] >= bin.split)];
+            fractions[texel] = (inside[texel] - lower) * inverse;
+            cells[texel] += place;
         }
     }
+}
+
+/// Cuts an axis into bins narrower than its shortest interval; none where that would be too many.
+fn guide(levels: &[f64], stride: f32) -> Option<Vec<Bin>> {
+    let (min, max) = (levels[0], levels[levels.len() - 1]);
+    let shortest = levels.windows(2).map(|p| p[1] - p[0]).fold(f64::INFINITY, f64::min);
+    let bins = ((max - min) / shortest).ceil() as usize + 1;
+    let side = |interval: usize| {
+        let [lower, upper] = [levels[interval], levels[interval + 1]];
+        [lower as f32, (1.0 / (upper - lower)) as f32, interval as f32 * stride]
+    };
+    let bin = |k: usize| {
+        let end = |k: usize| min + (max - min) * k as f64 / bins as f64;
+        // The last interval that begins before the bin, and the last one that begins before its end.
+        let begun = |at: f64| (levels.partition_point(|l| *l <= at).max(1) - 1).min(levels.len() - 2);
+        let [below, above] = [begun(end(k)), begun(end(k + 1))];
+        Bin { split: levels[above] as f32, sides: [side(below), side(above)] }
+    };
+    (bins <= MAX_BINS).then(|| (0..bins).map(bin).collect())
 }
 
 #[inline(always)]
@@ -290,25 +305,41 @@ fn blocks<S: Simd, const D: usize, const CORNERS: usize>(
     outputs: &mut [&mut [f32]],
 ) {
     let length = inputs[0].len();
+    let mut fractions = [[0.0; BLOCK]; D];
+    let mut found = [[0.0; LANES]; BLOCK];
     for first in (0..length).step_by(BLOCK) {
         let texels = first..(first + BLOCK).min(length);
         let mut cells = [0.0; BLOCK];
-        let mut fractions = [[0.0; BLOCK]; D];
         for ((axis, plane), fractions) in lut.axes.iter().zip(inputs).zip(&mut fractions) {
-            axis.find(simd, &plane[texels.clone()], fractions, &mut cells);
+            let values = &plane[texels.clone()];
+            if values.len() == BLOCK {
+                axis.find(simd, values, fractions, &mut cells);
+            } else {
+                let mut padded = [axis.range[0]; BLOCK];
+                padded[..values.len()].copy_from_slice(values);
+                axis.find(simd, &padded, fractions, &mut cells);
+            }
         }
+        let cells = whole(simd, &cells);
         for group in &lut.groups {
-            let mut found = [0.0; BLOCK * LANES];
             match group.between {
                 Between::Linear => linear::<S, D, CORNERS>(simd, group, &cells, &fractions, &mut found),
-                Between::Nearest => nearest::<D, CORNERS>(group, &cells, &fractions, &mut found),
+                Between::Nearest => nearest::<D>(group, &cells, &fractions, &mut found),
             }
-            let planes = planes_of(simd, &found);
-            for (lane, output) in group.lanes.iter().enumerate() {
-                outputs[*output][texels.clone()].copy_from_slice(&planes[lane][..texels.len()]);
-            }
+            spread(simd, &found, group, outputs, texels.clone());
         }
     }
+}
+
+/// Integers that are stored as floats.
+#[inline(always)]
+fn whole<S: Simd>(simd: S, cells: &[f32; BLOCK]) -> [u32; BLOCK] {
+    let mut whole = [0; BLOCK];
+    let width = S::f32s::LEN;
+    for (from, to) in cells.chunks_exact(width).zip(whole.chunks_exact_mut(width)) {
+        S::f32s::from_slice(simd, from).to_int::<S::u32s>().store_slice(to);
+    }
+    whole
 }
 
 /// The polynomials of the texels' cells at their fractions.
@@ -316,14 +347,13 @@ fn blocks<S: Simd, const D: usize, const CORNERS: usize>(
 fn linear<S: Simd, const D: usize, const CORNERS: usize>(
     simd: S,
     group: &Group,
-    cells: &[f32; BLOCK],
+    cells: &[u32; BLOCK],
     fractions: &[[f32; BLOCK]; D],
-    found: &mut [f32; BLOCK * LANES],
+    found: &mut [[f32; LANES]; BLOCK],
 ) {
-    let (table, _) = group.cells.as_chunks::<LANES>();
-    for (texel, found) in found.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-        let first = cells[texel] as usize * CORNERS;
-        let cell: &[[f32; LANES]] = &table[first..first + CORNERS];
+    for texel in 0..BLOCK {
+        let first = cells[texel] as usize;
+        let cell: &[[f32; LANES]] = &group.cells[first..first + CORNERS];
         let mut terms: [f32x4<S>; CORNERS] =
             std::array::from_fn(|corner| f32x4::from_slice(simd, &cell[corner]));
         let mut count = CORNERS;
@@ -334,36 +364,53 @@ fn linear<S: Simd, const D: usize, const CORNERS: usize>(
                 terms[i] = terms[2 * i + 1].mul_add(fraction, terms[2 * i]);
             }
         }
-        terms[0].store_slice(found);
+        terms[0].store_slice(&mut found[texel]);
     }
 }
 
 /// The corners of the texels' cells that their fractions are nearest to.
 #[inline(always)]
-fn nearest<const D: usize, const CORNERS: usize>(
+fn nearest<const D: usize>(
     group: &Group,
-    cells: &[f32; BLOCK],
+    cells: &[u32; BLOCK],
     fractions: &[[f32; BLOCK]; D],
-    found: &mut [f32; BLOCK * LANES],
+    found: &mut [[f32; LANES]; BLOCK],
 ) {
-    let (table, _) = group.cells.as_chunks::<LANES>();
-    for (texel, found) in found.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+    for texel in 0..BLOCK {
         let corner: usize = (0..D).map(|k| usize::from(fractions[k][texel] > 0.5) << k).sum();
-        *found = table[cells[texel] as usize * CORNERS + corner];
+        found[texel] = group.cells[cells[texel] as usize + corner];
     }
 }
 
-/// Texels of four outputs side by side as a plane for each output.
+/// Texels of four outputs side by side into a plane for each output.
 #[inline(always)]
-fn planes_of<S: Simd>(simd: S, texels: &[f32; BLOCK * LANES]) -> [[f32; BLOCK]; LANES] {
-    let mut planes = [[0.0; BLOCK]; LANES];
-    for (four, texels) in texels.as_chunks::<16>().0.iter().enumerate() {
-        let vectors = f32x4::load_four_interleaved(simd, texels);
-        for (plane, vector) in planes.iter_mut().zip(vectors) {
-            vector.store_slice(&mut plane[4 * four..4 * four + 4]);
+fn spread<S: Simd>(
+    simd: S,
+    found: &[[f32; LANES]; BLOCK],
+    group: &Group,
+    outputs: &mut [&mut [f32]],
+    texels: Range<usize>,
+) {
+    let width = S::f32s::LEN;
+    for (step, found) in found[..texels.len()].chunks(width).enumerate() {
+        let first = texels.start + step * width;
+        if found.len() == width {
+            let load = |i: usize| S::f32s::from_slice(simd, &found.as_flattened()[i * width..][..width]);
+            // Every second lane, twice: every fourth.
+            let (low, high) = (load(0).deinterleave(load(1)), load(2).deinterleave(load(3)));
+            let (even, odd) = (low.0.deinterleave(high.0), low.1.deinterleave(high.1));
+            let planes = [even.0, odd.0, even.1, odd.1];
+            for (plane, output) in planes.into_iter().zip(&group.lanes) {
+                plane.store_slice(&mut outputs[*output][first..first + width]);
+            }
+        } else {
+            for (lane, output) in group.lanes.iter().enumerate() {
+                for (to, found) in outputs[*output][first..].iter_mut().zip(found) {
+                    *to = found[lane];
+                }
+            }
         }
     }
-    planes
 }
 
 #[cfg(test)]

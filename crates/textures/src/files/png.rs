@@ -161,12 +161,38 @@ impl Bands for PngBands {
     }
 }
 
+/// Remembers what the system refused: the crate's own errors hide its kind, a full disk for one.
+struct Remembering<W> {
+    out: W,
+    failed: Option<io::Error>,
+}
+
+impl<W: Write> Write for Remembering<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes).map_err(|error| {
+            let shown = io::Error::from(error.kind());
+            self.failed = Some(error);
+            shown
+        })
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
 /// Writes rows as they come. A file is compressed by one thread; several maps are written at once.
 pub(super) fn write(
     sheet: &Sheet,
     out: impl Write + Seek + Send,
     bands: &mut dyn Iterator<Item = Arc<Band>>,
 ) -> io::Result<()> {
+    let mut out = Remembering { out, failed: None };
+    let written = write_rows(sheet, &mut out, bands);
+    written.map_err(|error| out.failed.unwrap_or(error))
+}
+
+fn write_rows(sheet: &Sheet, out: impl Write, bands: &mut dyn Iterator<Item = Arc<Band>>) -> io::Result<()> {
     let mut info = Info::with_size(sheet.width as u32, sheet.height as u32);
     info.color_type = if sheet.channels == 1 { ColorType::Grayscale } else { ColorType::Rgb };
     info.bit_depth = if sheet.format.depth == Depth::U8 { BitDepth::Eight } else { BitDepth::Sixteen };
@@ -183,12 +209,12 @@ pub(super) fn write(
             info.utf8_text.push(ITXtChunk::new(key, text));
         }
     }
-    let mut encoder = png::Encoder::with_info(out, info).map_err(plain)?;
+    let mut encoder = png::Encoder::with_info(out, info)?;
     if sheet.is_srgb && metadata.icc.is_none() {
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     }
-    let mut file = encoder.write_header().map_err(plain)?;
-    let mut writer = file.stream_writer_with_size(1 << 18).map_err(plain)?;
+    let mut file = encoder.write_header()?;
+    let mut writer = file.stream_writer_with_size(1 << 18)?;
     let mut pieces = Pieces::new(sheet, bands);
     let mut bytes = Vec::new();
     while let Some(ready) = pieces.next(16)? {
@@ -206,16 +232,8 @@ pub(super) fn write(
             writer.write_all(&bytes)?;
         }
     }
-    writer.finish().map_err(plain)?;
-    file.finish().map_err(plain)
-}
-
-/// The system's own error: the crate's conversion hides its kind, a full disk for one.
-fn plain(error: png::EncodingError) -> io::Error {
-    match error {
-        png::EncodingError::IoError(error) => error,
-        other => io::Error::other(other.to_string()),
-    }
+    writer.finish()?;
+    Ok(file.finish()?)
 }
 
 /// PNG specification, section 11.3.3: keywords have 1 to 79 Latin-1 characters, and zero ends a text.
