@@ -425,3 +425,7 @@ impl Drop for Folder {
 pub(crate) fn is_stopped(stop: &AtomicBool) -> bool {
     stop.load(Ordering::Relaxed)
 }
+
+#[cfg(test)]
+#[path = "convert_tests.rs"]
+mod tests;
