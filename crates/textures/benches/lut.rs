@@ -15,7 +15,8 @@ fn planes(count: usize) -> Vec<Vec<f32>> {
 
 fn table(levels: [Vec<f64>; 2]) -> Lut {
     let points = levels[0].len() * levels[1].len();
-    let output = |k: usize| (Between::Linear, (0..points).map(|i| ((i * 31 + k * 17) % 100) as f64).collect());
+    let output =
+        |k: usize| (Between::Linear, (0..points).map(|i| ((i * 31 + k * 17) % 100) as f64).collect());
     Lut::new(&levels, &[output(1), output(2), output(3)]).expect("a sound table")
 }
 

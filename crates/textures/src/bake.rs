@@ -1,20 +1,22 @@
 //! A probe as tables: what `apply` says of every texel, asked once for each point of a grid.
 //!
 //! Parameters that were searched are linear between the probe's own levels, so their table has these levels and is exact. What is
-//! carried over from the source (the colour of a body, say) may bend between them: its grid is made finer until the
-//! largest error found between its points is below [`TOLERANCE`] of the parameter's range.
+//! carried over from the source (the colour of a body, say) may bend between them: its grid is made finer where it does, until
+//! the largest error found between its points is below [`TOLERANCE`] of the parameter's range, or the points are too many.
+
+use std::collections::HashMap;
 
 use lookmatch_materials::{Kind, Material, Value};
 use lookmatch_remap::{Axis, Probe, RemapError, apply};
 use rayon::prelude::*;
 
-use crate::lut::{Between, Lut, MAX_INPUTS};
 use crate::TextureError;
+use crate::lut::{Between, Lut, MAX_INPUTS};
 
 /// Largest error of a table of carried-over values, as a share of the range that they have.
 pub const TOLERANCE: f64 = 1e-4;
-/// Points of such a table at most.
-const MAX_POINTS: usize = 20_000;
+/// Points that are asked for such a table, after which the error stays as it is, and is told.
+const MAX_POINTS: usize = 8_000;
 
 /// A source parameter that comes from a texture.
 #[derive(Clone, Debug)]
@@ -105,16 +107,12 @@ impl Question<'_> {
         levels: &[Vec<f64>],
         middle: &[f64],
     ) -> Result<Vec<Option<Vec<Value>>>, TextureError> {
-        let points: usize = levels.iter().map(Vec::len).product();
-        let at = |mut point: usize| {
+        let at = |point: Vec<f64>| {
             let mut values = middle.to_vec();
-            for (input, levels) in inputs.iter().zip(levels).rev() {
-                values[*input] = levels[point % levels.len()];
-                point /= levels.len();
-            }
+            inputs.iter().zip(point).for_each(|(input, value)| values[*input] = value);
             values
         };
-        (0..points).into_par_iter().map(|point| self.target(&self.source(&at(point))?)).collect()
+        points(levels).into_par_iter().map(|point| self.target(&self.source(&at(point))?)).collect()
     }
 }
 
@@ -202,7 +200,12 @@ impl Baked {
 
     /// Largest error of the tables of carried-over values, as a share of their ranges.
     pub(crate) fn error(&self) -> f64 {
-        self.maps.iter().filter_map(|m| Some(m.carried.as_ref()?.error)).fold(0.0, f64::max)
+        self.errors().map(|(_, error)| error).fold(0.0, f64::max)
+    }
+
+    /// Carried-over parameters, and the largest error of the table of each.
+    pub(crate) fn errors(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.maps.iter().filter_map(|m| Some((m.name.as_str(), m.carried.as_ref()?.error)))
     }
 
     /// Source parameters that a map depends on.
@@ -226,7 +229,8 @@ impl Baked {
         for (map, planes) in self.maps[tabulated..].iter().zip(carried) {
             let Some(carried) = &map.carried else { continue };
             for (channel, plane) in planes.iter_mut().enumerate() {
-                let of = |i: &usize| if self.inputs[*i].is_colour { inputs[*i][channel] } else { inputs[*i][0] };
+                let of =
+                    |i: &usize| if self.inputs[*i].is_colour { inputs[*i][channel] } else { inputs[*i][0] };
                 let places: Vec<&[f32]> = carried.inputs.iter().map(of).collect();
                 carried.lut.evaluate(&places, &mut [&mut **plane]);
             }
@@ -257,7 +261,9 @@ fn input(probe: &Probe, base: &Material, name: &str) -> Result<Input, TextureErr
             is_axis: true,
         });
     }
-    if let Some(axis) = probe.source_axes.iter().find(|axis| resolved(axis).iter().any(|i| indices.contains(i))) {
+    if let Some(axis) =
+        probe.source_axes.iter().find(|axis| resolved(axis).iter().any(|i| indices.contains(i)))
+    {
         let advice = format!("give the texture to '{}'", axis.name);
         let what = format!("the probe tabulates '{}' as one number, of which '{name}' is a part", axis.name);
         return Err(TextureError::Request(format!("{what}; {advice}")));
@@ -294,7 +300,8 @@ fn carried(question: &Question, index: usize, middle: &[f64]) -> Result<Option<M
         _ => 0,
     };
     let by_colour = inputs.iter().any(|i| question.inputs[*i].is_colour);
-    if channels == 0 || inputs.len() > MAX_INPUTS || (by_colour && !keeps_channels(question, index, middle)?) {
+    if channels == 0 || inputs.len() > MAX_INPUTS || (by_colour && !keeps_channels(question, index, middle)?)
+    {
         let names: Vec<&str> = inputs.iter().map(|i| question.inputs[*i].name.as_str()).collect();
         let names = names.join(" and ");
         return Err(TextureError::Request(format!(
@@ -316,7 +323,8 @@ fn carried(question: &Question, index: usize, middle: &[f64]) -> Result<Option<M
 fn depends(question: &Question, index: usize, input: usize, middle: &[f64]) -> Result<bool, TextureError> {
     for share in [0.5, 0.2, 0.8] {
         let at = |i: &Input| i.range[0] + share * (i.range[1] - i.range[0]);
-        let base: Vec<f64> = if share == 0.5 { middle.to_vec() } else { question.inputs.iter().map(at).collect() };
+        let base: Vec<f64> =
+            if share == 0.5 { middle.to_vec() } else { question.inputs.iter().map(at).collect() };
         let levels = &question.inputs[input].levels;
         let ends = vec![levels[0], levels[levels.len() / 2], levels[levels.len() - 1]];
         let ends = if levels.len() < 3 { levels.clone() } else { ends };
@@ -333,7 +341,9 @@ fn keeps_channels(question: &Question, index: usize, middle: &[f64]) -> Result<b
     let shares = [0.2, 0.5, 0.7];
     let at = |share: f64| -> Vec<f64> {
         let inputs = question.inputs.iter().zip(middle);
-        inputs.map(|(i, m)| if i.is_colour { i.range[0] + share * (i.range[1] - i.range[0]) } else { *m }).collect()
+        inputs
+            .map(|(i, m)| if i.is_colour { i.range[0] + share * (i.range[1] - i.range[0]) } else { *m })
+            .collect()
     };
     let mut source = question.source(middle)?;
     let model = source.model();
@@ -363,51 +373,89 @@ fn table(
     inputs: &[usize],
     middle: &[f64],
 ) -> Result<(Lut, [f64; 2], f64), TextureError> {
-    let first = |targets: Vec<Option<Vec<Value>>>| -> Vec<f64> {
-        let value = |t: Option<Vec<Value>>| t.and_then(|t| numbers(&t[index]).first().copied());
-        targets.into_iter().map(|t| value(t).unwrap_or(f64::NAN)).collect()
-    };
+    let mut known = Known { question, index, inputs, middle, values: HashMap::new() };
     let mut levels: Vec<Vec<f64>> = inputs.iter().map(|i| question.inputs[*i].levels.clone()).collect();
     loop {
-        let values = first(question.grid(inputs, &levels, middle)?);
+        let values = known.grid(&levels)?;
         let span = range(&values);
         let lut = Lut::new(&levels, &[(Between::Linear, values)]);
         let lut = lut.map_err(|e| TextureError::Request(e.to_string()))?;
-        // Between two points of one axis, at the points of the others.
-        let mut worst = (0.0, 0);
+        // By axis and interval: the error half-way, at the points of the other axes.
+        let mut errors: Vec<Vec<f64>> = Vec::new();
         for axis in 0..inputs.len() {
             let mut between = levels.clone();
             between[axis] = levels[axis].windows(2).map(|p| 0.5 * (p[0] + p[1])).collect();
-            let exact = first(question.grid(inputs, &between, middle)?);
-            let error = largest_error(&lut, &between, &exact) / (span[1] - span[0]).max(1e-6);
-            if error > worst.0 {
-                worst = (error, axis);
-            }
+            let exact = known.grid(&between)?;
+            let errors_here = interval_errors(&lut, &between, axis, &exact).into_iter();
+            errors.push(errors_here.map(|e| e / (span[1] - span[0]).max(1e-6)).collect());
         }
-        let points: usize = levels.iter().map(Vec::len).product();
+        let worst = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
         // The errors of several axes add up.
-        if worst.0 * inputs.len() as f64 <= TOLERANCE || 2 * points > MAX_POINTS {
-            return Ok((lut, span, worst.0 * inputs.len() as f64));
+        let total: f64 = errors.iter().map(|e| worst(e)).sum();
+        if total <= TOLERANCE || known.values.len() > MAX_POINTS {
+            return Ok((lut, span, total));
         }
-        let axis = &mut levels[worst.1];
-        let middles: Vec<f64> = axis.windows(2).map(|p| 0.5 * (p[0] + p[1])).collect();
-        axis.extend(middles);
-        axis.sort_by(f64::total_cmp);
+        let limit = (0.25 * worst(&errors.concat())).max(TOLERANCE / inputs.len() as f64);
+        for (levels, errors) in levels.iter_mut().zip(&errors) {
+            let coarse = levels.windows(2).zip(errors).filter(|(_, error)| **error > limit);
+            let middles: Vec<f64> = coarse.map(|(p, _)| 0.5 * (p[0] + p[1])).collect();
+            levels.extend(middles);
+            levels.sort_by(f64::total_cmp);
+        }
     }
 }
 
-fn largest_error(lut: &Lut, levels: &[Vec<f64>], exact: &[f64]) -> f64 {
-    let mut planes = vec![Vec::with_capacity(exact.len()); levels.len()];
-    for point in 0..exact.len() {
-        let mut rest = point;
-        for (plane, levels) in planes.iter_mut().zip(levels).rev() {
-            plane.push(levels[rest % levels.len()] as f32);
-            rest /= levels.len();
-        }
+/// What was asked already about one parameter: each answer is two integrals over the hemisphere.
+struct Known<'a> {
+    question: &'a Question<'a>,
+    index: usize,
+    inputs: &'a [usize],
+    middle: &'a [f64],
+    values: HashMap<Vec<u64>, f64>,
+}
+
+impl Known<'_> {
+    /// The parameter on a grid; NaN where the probe has no result.
+    fn grid(&mut self, levels: &[Vec<f64>]) -> Result<Vec<f64>, TextureError> {
+        let points: Vec<Vec<f64>> = points(levels);
+        let key = |point: &Vec<f64>| -> Vec<u64> { point.iter().map(|v| v.to_bits()).collect() };
+        let missing: Vec<&Vec<f64>> = points.iter().filter(|p| !self.values.contains_key(&key(p))).collect();
+        let ask = |point: &&Vec<f64>| {
+            let mut values = self.middle.to_vec();
+            self.inputs.iter().zip(*point).for_each(|(input, value)| values[*input] = *value);
+            let target = self.question.target(&self.question.source(&values)?)?;
+            let value = target.and_then(|t| numbers(&t[self.index]).first().copied());
+            Ok((key(point), value.unwrap_or(f64::NAN)))
+        };
+        let found: Vec<(Vec<u64>, f64)> = missing.par_iter().map(ask).collect::<Result<_, TextureError>>()?;
+        self.values.extend(found);
+        Ok(points.iter().map(|p| self.values[&key(p)]).collect())
     }
+}
+
+/// The points of a grid, the first axis slowest.
+fn points(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    levels.iter().fold(vec![Vec::new()], |points, levels| {
+        let longer =
+            |point: Vec<f64>| levels.iter().map(move |l| [&point[..], &[*l]].concat()).collect::<Vec<_>>();
+        points.into_iter().flat_map(longer).collect()
+    })
+}
+
+/// By level of an axis, the largest difference of a table from what is exact on a grid.
+fn interval_errors(lut: &Lut, levels: &[Vec<f64>], axis: usize, exact: &[f64]) -> Vec<f64> {
+    let points = points(levels);
+    let planes: Vec<Vec<f32>> =
+        (0..levels.len()).map(|k| points.iter().map(|p| p[k] as f32).collect()).collect();
     let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
     let mut found = vec![0.0; exact.len()];
     lut.evaluate(&planes, &mut [&mut found]);
-    // NaN, where the probe has no result, is no error of the table.
-    found.iter().zip(exact).map(|(f, e)| (f64::from(*f) - e).abs()).fold(0.0, f64::max)
+    let mut errors = vec![0.0; levels[axis].len()];
+    let stride: usize = levels[axis + 1..].iter().map(Vec::len).product();
+    for (point, (found, exact)) in found.iter().zip(exact).enumerate() {
+        let interval = point / stride % levels[axis].len();
+        // NaN, where the probe has no result, is no error of the table.
+        errors[interval] = (f64::from(*found) - exact).abs().max(errors[interval]);
+    }
+    errors
 }

@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use lookmatch_materials::Material;
 use lookmatch_remap::{Probe, RemapError};
 
-use crate::bake::{Baked, Input, Map};
+use crate::TextureError;
+use crate::bake::{Baked, Input, Map, TOLERANCE};
 use crate::encoding::{Codes, Encoding, named_srgb};
 use crate::files::{self, Container, Depth, Format, Header, Metadata, Sheet};
 use crate::report::{self, Report};
 use crate::stream::{Job, Outside, Reading, stream};
 use crate::udim::{Tiles, map_name, tiles};
-use crate::TextureError;
 
 /// What to make of which textures.
 #[derive(Clone, Debug)]
@@ -60,12 +60,17 @@ pub fn convert(
     let base = base(request)?;
     let names: Vec<String> = request.textures.iter().map(|(name, _)| name.clone()).collect();
     let baked = Baked::new(request.probe, &base, &names)?;
-    if let Some(twice) = baked.inputs.iter().enumerate().find(|(i, a)| {
-        baked.inputs[..*i].iter().any(|b| a.name == b.name)
-    }) {
+    if let Some(twice) =
+        baked.inputs.iter().enumerate().find(|(i, a)| baked.inputs[..*i].iter().any(|b| a.name == b.name))
+    {
         return Err(TextureError::Request(format!("'{}' has two textures", twice.1.name)));
     }
     let mut notes = Vec::new();
+    for (name, error) in baked.errors().filter(|(_, error)| *error > TOLERANCE) {
+        notes.push(format!(
+            "{name} is carried over by a table, which misses what `apply` says by up to {error:.1e} of its range"
+        ));
+    }
     let mut textures = open_all(request, &baked, &mut notes)?;
     let folder = Folder::new(&request.folder)?;
     let formats = formats(request, &baked, &textures, &mut notes)?;
@@ -78,9 +83,7 @@ pub fn convert(
     for (tile, (width, height)) in numbers.iter().zip(&sizes) {
         let sheets = sheets(&baked, &textures, &formats, *tile, request)?;
         let paths: Vec<PathBuf> = (baked.maps.iter().zip(&sheets))
-            .map(|(map, sheet)| {
-                PathBuf::from(map_name(&map.name, *tile, sheet.format.container.extension()))
-            })
+            .map(|(map, sheet)| PathBuf::from(map_name(&map.name, *tile, sheet.format.container.extension())))
             .collect();
         folder.check(&paths, &textures)?;
         let job = Job {
@@ -92,10 +95,13 @@ pub fn convert(
             readings: textures.iter().map(|t| Reading::new(t, *tile)).collect(),
             clamp: request.clamp,
         };
-        let found = stream(&job, &|rows| progress(done + rows, total), stop).map_err(|error| match error {
-            TextureError::Interrupted { .. } => TextureError::Interrupted { folder: request.folder.clone() },
-            other => other,
-        })?;
+        let found =
+            stream(&job, &|rows| progress(done + rows, total), stop).map_err(|error| match error {
+                TextureError::Interrupted { .. } => {
+                    TextureError::Interrupted { folder: request.folder.clone() }
+                }
+                other => other,
+            })?;
         for (texture, seen) in textures.iter_mut().zip(found.inputs) {
             texture.codes = seen.codes;
             texture.outside.add(&seen.outside);
@@ -152,7 +158,12 @@ fn open_all(request: &Request, baked: &Baked, notes: &mut Vec<String>) -> Result
             notes.push(format!("{}: the alpha channel of '{}' is not used", input.name, first.display()));
         }
         if path == first && tiles.len() > 1 {
-            notes.push(format!("{}: '{}' is one of {} tiles; all are mapped", input.name, path.display(), tiles.len()));
+            notes.push(format!(
+                "{}: '{}' is one of {} tiles; all are mapped",
+                input.name,
+                path.display(),
+                tiles.len()
+            ));
         }
         let indices = model.resolve(&input.name).map_err(RemapError::from)?;
         let asked = request.encodings.iter().find(|(n, _)| model.resolve(n).is_ok_and(|i| i == indices));
@@ -181,7 +192,8 @@ fn check_channels(input: &Input, path: &Path, header: &Header) -> Result<(), Tex
     if header.channels == wanted {
         return Ok(());
     }
-    let what = if input.is_colour { "a colour, which needs R, G and B" } else { "one number, which needs one" };
+    let what =
+        if input.is_colour { "a colour, which needs R, G and B" } else { "one number, which needs one" };
     Err(TextureError::Request(format!(
         "'{}' has {} channel{} ({}), but {} is {what}",
         path.display(),
@@ -207,7 +219,9 @@ fn encoding(
     let reason = header.srgb.clone().or_else(|| named_srgb(path));
     if input.is_colour && header.format.depth.is_integer() {
         let why = reason.unwrap_or_else(|| "it is a colour in integers".into());
-        notes.push(format!("{name}: '{file}' is decoded from sRGB, because {why}; --encoding {name}=linear if not"));
+        notes.push(format!(
+            "{name}: '{file}' is decoded from sRGB, because {why}; --encoding {name}=linear if not"
+        ));
         return Encoding::Srgb;
     }
     if let Some(reason) = reason {
@@ -231,7 +245,12 @@ fn sizes(baked: &Baked, textures: &[Texture]) -> Result<Vec<(usize, usize)>, Tex
                 Some((other, wanted)) if wanted != size => {
                     return Err(TextureError::Request(format!(
                         "'{}' has {} x {} texels, '{}' has {} x {}; textures of one tile must have the same size",
-                        other.display(), wanted.0, wanted.1, path.display(), size.0, size.1
+                        other.display(),
+                        wanted.0,
+                        wanted.1,
+                        path.display(),
+                        size.0,
+                        size.1
                     )));
                 }
                 _ => first = Some((path, size)),
@@ -261,7 +280,10 @@ fn formats(
         let found = format!("{} lies between {:.4} and {:.4}", map.name, map.range[0], map.range[1]);
         if request.format.is_some() {
             let advice = "use --format exr-half, exr-float, tiff-half or tiff-float";
-            return Err(TextureError::Request(format!("{found}, which {} cannot hold; {advice}", usual.name())));
+            return Err(TextureError::Request(format!(
+                "{found}, which {} cannot hold; {advice}",
+                usual.name()
+            )));
         }
         let depth = if usual.depth == Depth::U8 { Depth::F16 } else { Depth::F32 };
         let format = Format { container: Container::Exr, depth };
@@ -291,7 +313,8 @@ fn sheets(
             metadata.icc = None;
         }
         let (from, to) = (request.base.model().name, request.probe.to.model().name);
-        metadata.note("lookmatch", &format!("{} of {to}, from textures of {from}", map.parameters.join(", ")));
+        metadata
+            .note("lookmatch", &format!("{} of {to}, from textures of {from}", map.parameters.join(", ")));
         let (width, height) = (headers[0].width, headers[0].height);
         Sheet { width, height, channels: map.channels, format: *format, metadata, is_srgb }
     };
@@ -387,7 +410,10 @@ impl Folder {
             let is_source = |path: &PathBuf| path.canonicalize().is_ok_and(|p| p == real);
             if textures.iter().any(|t| t.tiles.values().any(is_source)) {
                 let advice = "give another folder";
-                return Err(TextureError::Request(format!("'{}' is one of the textures; {advice}", target.display())));
+                return Err(TextureError::Request(format!(
+                    "'{}' is one of the textures; {advice}",
+                    target.display()
+                )));
             }
             if real.is_dir() {
                 return Err(TextureError::Request(format!("'{}' is a folder", target.display())));

@@ -142,7 +142,10 @@ fn every_texel_equals_apply_in_every_format() {
                 let expected = applied(&probe, &source, name)[0];
                 let found = f64::from(planes[0][texel]);
                 let error = (found - expected).abs();
-                assert!(error <= tolerance(written, expected), "{format} {name}: {found} {expected} {source:?}");
+                assert!(
+                    error <= tolerance(written, expected),
+                    "{format} {name}: {found} {expected} {source:?}"
+                );
             }
         }
         fs::remove_dir_all(folder.path().join("out")).unwrap();
@@ -251,7 +254,9 @@ fn values_outside_are_counted_and_named_and_nothing_is_written() {
     let error = run(&request).unwrap_err();
     assert!(!error.is_usage());
     let error = error.to_string();
-    for words in ["2 of 800 values", "[0.01, 0.69]", "x = 7, y = 2 of tile 1002 (0.9)", "x = 19, y = 19", "--clamp"] {
+    for words in
+        ["2 of 800 values", "[0.01, 0.69]", "x = 7, y = 2 of tile 1002 (0.9)", "x = 19, y = 19", "--clamp"]
+    {
         assert!(error.contains(words), "no '{words}' in {error}");
     }
     assert!(!folder.path().join("out").exists());
@@ -279,7 +284,8 @@ fn faults_leave_the_folder_as_it_was() {
     let mut request = request(&probe, &textures, folder.path());
     request.band_rows = Some(16);
     run(&request).unwrap();
-    let before: Vec<Vec<u8>> = names(&request.folder).iter().map(|n| fs::read(request.folder.join(n)).unwrap()).collect();
+    let before: Vec<Vec<u8>> =
+        names(&request.folder).iter().map(|n| fs::read(request.folder.join(n)).unwrap()).collect();
     let unchanged = |what: &str| {
         let out = folder.path().join("out");
         assert_eq!(names(&out), ["ior.exr", "material.json", "roughness.exr"], "{what}");
@@ -351,7 +357,11 @@ fn encodings_are_asked_told_and_kept() {
     request.encodings = vec![("roughness".into(), Encoding::Srgb)];
     request.format = None;
     let report = run(&request).unwrap();
-    assert!(report.notes.iter().any(|n| n.contains("diffuse") && n.contains("decoded from sRGB")), "{:?}", report.notes);
+    assert!(
+        report.notes.iter().any(|n| n.contains("diffuse") && n.contains("decoded from sRGB")),
+        "{:?}",
+        report.notes
+    );
     assert_eq!(report.parameters["diffuse"]["encoding"], "srgb");
     assert_eq!(report.parameters["roughness_u"]["encoding"], "linear");
     // A colour that nothing changes keeps its codes.
@@ -367,5 +377,9 @@ fn encodings_are_asked_told_and_kept() {
     request.encodings.clear();
     request.clamp = true;
     let report = run(&request).unwrap();
-    assert!(report.notes.iter().any(|n| n.contains("gaps") && n.contains("--encoding roughness=srgb")), "{:?}", report.notes);
+    assert!(
+        report.notes.iter().any(|n| n.contains("gaps") && n.contains("--encoding roughness=srgb")),
+        "{:?}",
+        report.notes
+    );
 }

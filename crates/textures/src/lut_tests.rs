@@ -78,7 +78,11 @@ fn tables_of_any_shape_equal_the_books_on_every_instruction_set() {
                     let error = (f64::from(found[texel]) - expected).abs();
                     // Half of a level's distance is undecided within rounding.
                     let is_tie = *between == Between::Nearest && error > 0.0 && near_tie(&levels, &at);
-                    assert!(error < 7e-4 || is_tie, "{level:?} {between:?} {at:?}: {} {expected}", found[texel]);
+                    assert!(
+                        error < 7e-4 || is_tie,
+                        "{level:?} {between:?} {at:?}: {} {expected}",
+                        found[texel]
+                    );
                 }
             }
         }
@@ -96,7 +100,10 @@ fn near_tie(levels: &[Vec<f64>], at: &[f64]) -> bool {
 fn interpolation_is_exact_to_a_millionth_of_the_range() {
     let rng = &mut Pcg64Mcg::seed_from_u64(3);
     for levels in [
-        vec![(0..20).map(|i| 0.02 * f64::from(i + 1)).collect(), (0..35).map(|i| 0.02 * f64::from(i) + 0.01).collect()],
+        vec![
+            (0..20).map(|i| 0.02 * f64::from(i + 1)).collect(),
+            (0..35).map(|i| 0.02 * f64::from(i) + 0.01).collect(),
+        ],
         vec![vec![0.02, 0.12, 0.22, 0.3, 0.4], vec![0.01, 0.19, 0.35, 0.53, 0.69]],
         vec![vec![0.0, 0.001, 0.6, 1.0], vec![0.01, 0.0101, 0.7]],
     ] {
@@ -111,15 +118,23 @@ fn interpolation_is_exact_to_a_millionth_of_the_range() {
             let at: Vec<f64> = at.iter().map(|v| f64::from(*v)).collect();
             let expected = reference(&levels, &values, Between::Linear, &at);
             // A step of 0.0001 at 0.01 is known to 1e-5 of itself in single precision.
-            let steepest = levels.iter().flat_map(|l| l.windows(2).map(|p| p[0].abs() / (p[1] - p[0]))).fold(1.0, f64::max);
-            assert!((f64::from(found[0]) - expected).abs() < 1e-6 * steepest.max(1.0), "{at:?} {} {expected}", found[0]);
+            let steepest = levels
+                .iter()
+                .flat_map(|l| l.windows(2).map(|p| p[0].abs() / (p[1] - p[0])))
+                .fold(1.0, f64::max);
+            assert!(
+                (f64::from(found[0]) - expected).abs() < 1e-6 * steepest.max(1.0),
+                "{at:?} {} {expected}",
+                found[0]
+            );
         }
     }
 }
 
 #[test]
 fn missing_values_stay_within_their_cells() {
-    let lut = Lut::new(&[vec![0.0, 1.0, 2.0, 3.0]], &[(Between::Linear, vec![f64::NAN, 1.0, 2.0, 3.0])]).unwrap();
+    let lut =
+        Lut::new(&[vec![0.0, 1.0, 2.0, 3.0]], &[(Between::Linear, vec![f64::NAN, 1.0, 2.0, 3.0])]).unwrap();
     let mut found = [0.0; 3];
     lut.evaluate(&[&[0.5, 1.5, f32::NAN]], &mut [&mut found]);
     assert!(found[0].is_nan());

@@ -40,7 +40,8 @@ pub struct Report {
 impl Report {
     /// Target parameters with a map: the map's file name (`<UDIM>` for the tile) and the parameter.
     pub fn maps(&self) -> Vec<(&str, &str)> {
-        let maps = self.parameters.iter().filter_map(|(name, v)| Some((v["texture"].as_str()?, name.as_str())));
+        let maps =
+            self.parameters.iter().filter_map(|(name, v)| Some((v["texture"].as_str()?, name.as_str())));
         maps.collect()
     }
 

@@ -79,11 +79,8 @@ impl Outside {
             }
             return;
         }
-        (self.least, self.most) = if self.count == 0 {
-            (value, value)
-        } else {
-            (self.least.min(value), self.most.max(value))
-        };
+        (self.least, self.most) =
+            if self.count == 0 { (value, value) } else { (self.least.min(value), self.most.max(value)) };
         self.count += 1;
         if self.first.len() < NAMED {
             self.first.push(place());
@@ -169,7 +166,8 @@ pub(crate) fn stream(job: &Job, progress: &dyn Fn(usize), stop: &AtomicBool) -> 
                 return Err(TextureError::Interrupted { folder: PathBuf::new() });
             }
             let bands = next_bands(&readers, &mut found, job, first)?;
-            let is_doomed = found.inputs.iter().any(|i| i.outside.invalid > 0 || (i.outside.count > 0 && !job.clamp));
+            let is_doomed =
+                found.inputs.iter().any(|i| i.outside.invalid > 0 || (i.outside.count > 0 && !job.clamp));
             if is_doomed {
                 writers = None;
             }
@@ -286,7 +284,8 @@ fn next_bands(
 fn place(job: &Job, first: usize, texel: usize, channel: &str, value: Option<f32>) -> String {
     let (x, y) = (texel % job.size.0, first + texel / job.size.0);
     let tile = job.tile.map_or(String::new(), |tile| format!(" of tile {tile}"));
-    let value = value.map_or(String::new(), |v| format!(" ({channel}{}{v})", if channel.is_empty() { "" } else { " " }));
+    let value = value
+        .map_or(String::new(), |v| format!(" ({channel}{}{v})", if channel.is_empty() { "" } else { " " }));
     format!("x = {x}, y = {y}{tile}{value}")
 }
 

@@ -67,7 +67,15 @@ mod tests {
     #[test]
     fn tiles_are_found_by_token_and_by_the_first_number() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["r.1001.exr", "r.1002.exr", "r.1011.exr", "r.0999.exr", "r.10010.exr", "s.1003.exr", "r.1004.png"] {
+        for name in [
+            "r.1001.exr",
+            "r.1002.exr",
+            "r.1011.exr",
+            "r.0999.exr",
+            "r.10010.exr",
+            "s.1003.exr",
+            "r.1004.png",
+        ] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         let numbers = |name: &str| -> Vec<Option<u32>> {

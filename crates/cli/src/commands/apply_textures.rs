@@ -115,6 +115,12 @@ fn text(report: &Report, request: &Request) -> String {
         rows.push(vec![name.to_owned(), format!("{value} (the same everywhere, no map)")]);
     }
     let size = report.size.first().map_or(String::new(), |[w, h]| format!(", {w} x {h} texels"));
-    let tiles = if report.tiles.is_empty() { String::new() } else { format!(", {} tiles", report.tiles.len()) };
-    format!("{}: {}{size}{tiles}\n{}", request.folder.join("material.json").display(), report.model, table(&rows))
+    let tiles =
+        if report.tiles.is_empty() { String::new() } else { format!(", {} tiles", report.tiles.len()) };
+    format!(
+        "{}: {}{size}{tiles}\n{}",
+        request.folder.join("material.json").display(),
+        report.model,
+        table(&rows)
+    )
 }

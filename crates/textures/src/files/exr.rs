@@ -125,7 +125,8 @@ fn metadata(header: &ExrHeader) -> Metadata {
         .collect();
     // A hash map has them in any order.
     text.sort();
-    for (key, value) in [("Comment", &own.comments), ("Author", &own.owner), ("Software", &own.software_name)] {
+    for (key, value) in [("Comment", &own.comments), ("Author", &own.owner), ("Software", &own.software_name)]
+    {
         text.extend(value.as_ref().map(|value| (key.to_owned(), value.to_string())));
     }
     let per_metre = |inch: f32| f64::from(inch) / 0.0254;
@@ -306,10 +307,14 @@ fn header(sheet: &Sheet) -> ExrHeader {
     own.preview = None;
     // What the crate would refuse as given twice.
     shared.other.retain(|key, _| !own.other.contains_key(key));
-    ExrHeader::new(Text::new_or_none("texture").unwrap_or_default(), size, names.iter().map(channel).collect())
-        .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
-        .with_shared_attributes(shared)
-        .with_attributes(own)
+    ExrHeader::new(
+        Text::new_or_none("texture").unwrap_or_default(),
+        size,
+        names.iter().map(channel).collect(),
+    )
+    .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+    .with_shared_attributes(shared)
+    .with_attributes(own)
 }
 
 fn note(own: &mut LayerAttributes, key: &str, value: &str) {

@@ -56,15 +56,15 @@ impl Container {
     }
 }
 
-/// How a sample is stored.
+/// How a sample is stored, the least precise (between 0 and 1) first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Depth {
     /// 8-bit integer, 255 for 1.
     U8,
-    /// 16-bit integer, 65535 for 1.
-    U16,
     /// Half float.
     F16,
+    /// 16-bit integer, 65535 for 1.
+    U16,
     /// Single float.
     F32,
 }

@@ -57,16 +57,8 @@ pub(super) fn open(path: &Path, file: BufReader<File>) -> Result<(Header, Box<dy
     };
     let is_interlaced = info.interlaced;
     let samples = channels + usize::from(has_alpha);
-    let mut bands = PngBands {
-        path: path.into(),
-        reader,
-        samples,
-        depth,
-        width,
-        row: Vec::new(),
-        whole: None,
-        next: 0,
-    };
+    let mut bands =
+        PngBands { path: path.into(), reader, samples, depth, width, row: Vec::new(), whole: None, next: 0 };
     if is_interlaced {
         bands.decode_whole()?;
     }
@@ -84,7 +76,9 @@ fn truncated(reason: &str) -> String {
 fn metadata(info: &Info) -> Metadata {
     let mut text: Vec<(String, String)> =
         info.uncompressed_latin1_text.iter().map(|t| (t.keyword.clone(), t.text.clone())).collect();
-    text.extend(info.compressed_latin1_text.iter().filter_map(|t| Some((t.keyword.clone(), t.get_text().ok()?))));
+    text.extend(
+        info.compressed_latin1_text.iter().filter_map(|t| Some((t.keyword.clone(), t.get_text().ok()?))),
+    );
     text.extend(info.utf8_text.iter().filter_map(|t| Some((t.keyword.clone(), t.get_text().ok()?))));
     let resolution = match info.pixel_dims {
         Some(PixelDimensions { xppu, yppu, unit: Unit::Meter }) => Some([f64::from(xppu), f64::from(yppu)]),
@@ -224,8 +218,9 @@ fn write_rows(sheet: &Sheet, out: impl Write, bands: &mut dyn Iterator<Item = Ar
                 for plane in &piece {
                     match sheet.format.depth {
                         Depth::U8 => bytes.push(quantised(plane[texel], 255.0) as u8),
-                        _ => bytes
-                            .extend_from_slice(&(quantised(plane[texel], 65535.0) as u16).to_be_bytes()),
+                        _ => {
+                            bytes.extend_from_slice(&(quantised(plane[texel], 65535.0) as u16).to_be_bytes())
+                        }
                     }
                 }
             }

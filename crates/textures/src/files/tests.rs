@@ -125,8 +125,13 @@ fn a_full_disk_and_an_early_end_are_errors_wherever_they_come() {
         let length = bytes(&sheet, 16).len() as u64;
         for room in [0, 10, length / 3, length / 2, length - 1] {
             let mut out = Full { inner: Cursor::default(), room };
-            let error = write(&sheet, &mut out, &mut std::iter::once(Arc::new(band(&sheet, 0..64)))).unwrap_err();
-            assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{format:?} with {room} of {length} bytes: {error}");
+            let error =
+                write(&sheet, &mut out, &mut std::iter::once(Arc::new(band(&sheet, 0..64)))).unwrap_err();
+            assert_eq!(
+                error.kind(),
+                io::ErrorKind::StorageFull,
+                "{format:?} with {room} of {length} bytes: {error}"
+            );
         }
         let mut out = Cursor::new(Vec::new());
         let error = write(&sheet, &mut out, &mut std::iter::once(Arc::new(band(&sheet, 0..40)))).unwrap_err();
@@ -158,9 +163,9 @@ fn damaged_files_are_refused_by_name_and_never_panic() {
 
 #[test]
 fn tiles_lines_from_the_bottom_and_every_compression_of_exr_are_read() {
+    use exr::compression::Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
     use exr::image::write::WritableImage;
     use exr::image::{Blocks, Encoding, Image, Layer, SpecificChannels};
-    use exr::compression::Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
     use exr::math::Vec2;
     use exr::meta::attribute::LineOrder::{Decreasing, Increasing};
     use exr::meta::header::LayerAttributes;
@@ -173,7 +178,8 @@ fn tiles_lines_from_the_bottom_and_every_compression_of_exr_are_read() {
             (Blocks::ScanLines, Decreasing),
             (Blocks::Tiles(Vec2(32, 48)), Increasing),
         ] {
-            let channels = SpecificChannels::build().with_channel("Y").with_pixel_fn(|Vec2(x, y)| (at(x, y),));
+            let channels =
+                SpecificChannels::build().with_channel("Y").with_pixel_fn(|Vec2(x, y)| (at(x, y),));
             let encoding = Encoding { compression, blocks, line_order };
             let layer = Layer::new((100, 130), LayerAttributes::default(), encoding, channels);
             Image::from_layer(layer).write().non_parallel().to_file(&path).unwrap();

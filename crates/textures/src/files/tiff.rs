@@ -121,7 +121,8 @@ fn truncated(error: &tiff::TiffError) -> String {
 
 fn metadata(decoder: &mut Decoder<BufReader<File>>) -> Metadata {
     let mut find = |tag| decoder.find_tag(tag).ok().flatten();
-    let text = NOTES.iter().filter_map(|(tag, key)| Some(((*key).to_owned(), find(*tag)?.into_string().ok()?)));
+    let text =
+        NOTES.iter().filter_map(|(tag, key)| Some(((*key).to_owned(), find(*tag)?.into_string().ok()?)));
     let text = text.collect();
     let icc = find(Tag::IccProfile).and_then(|v| v.into_u8_vec().ok());
     let unit = find(Tag::ResolutionUnit).and_then(|v| v.into_u16().ok()).unwrap_or(2);
