@@ -3,6 +3,7 @@
 pub(crate) mod apply;
 pub(crate) mod apply_textures;
 pub(crate) mod bench;
+pub(crate) mod cache;
 pub(crate) mod compare;
 pub(crate) mod cross;
 pub(crate) mod eval;
