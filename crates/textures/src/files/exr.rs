@@ -336,7 +336,7 @@ impl Metadata {
         self.text.retain(|(k, _)| k != key);
         self.text.push((key.to_owned(), value.to_owned()));
         if let Some(exr) = &mut self.exr {
-            exr.0.other.retain(|k, _| k.to_string() != key);
+            exr.0.other.retain(|k, _| !k.eq(key));
             note(&mut exr.1, key, value);
         }
     }

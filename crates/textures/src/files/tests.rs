@@ -202,9 +202,9 @@ fn attributes_of_exr_are_kept_whatever_their_type() {
     let path = stored(folder.path(), "a", format, &bytes(&sheet, 8));
     let mut kept = open(&path).unwrap().0.metadata;
     let exr = kept.exr.as_mut().unwrap();
-    exr.1.other.insert("displacement".try_into().unwrap(), AttributeValue::F32(0.25));
-    exr.1.other.insert("corner".try_into().unwrap(), AttributeValue::IntVec2(exr::math::Vec2(3, -4)));
-    exr.1.wrap_mode_name = "periodic".try_into().ok();
+    exr.1.other.insert("displacement".into(), AttributeValue::F32(0.25));
+    exr.1.other.insert("corner".into(), AttributeValue::IntVec2(exr::math::Vec2(3, -4)));
+    exr.1.wrap_mode_name = Some("periodic".into());
     exr.0.pixel_aspect = 1.5;
     kept.note("lookmatch", "a map");
     sheet.metadata = kept.clone();

@@ -40,8 +40,9 @@ struct TiffBands {
     samples: usize,
     width: usize,
     height: usize,
-    pending: Band,
-    decoded: usize,
+    /// The decoded strip or tiles of some rows.
+    chunks: Vec<DecodingResult>,
+    rows: Range<usize>,
 }
 
 /// Reads the first image's directory.
@@ -95,15 +96,8 @@ pub(super) fn open(path: &Path, file: BufReader<File>) -> Result<(Header, Box<dy
         srgb,
     };
     let samples = channels + usize::from(has_alpha);
-    let bands = TiffBands {
-        path: path.into(),
-        decoder,
-        samples,
-        width,
-        height,
-        pending: vec![Vec::new(); channels],
-        decoded: 0,
-    };
+    let bands =
+        TiffBands { path: path.into(), decoder, samples, width, height, chunks: Vec::new(), rows: 0..0 };
     Ok((header, Box::new(bands)))
 }
 
@@ -141,49 +135,56 @@ fn metadata(decoder: &mut Decoder<BufReader<File>>) -> Metadata {
 }
 
 impl TiffBands {
-    /// Decodes the next row of strips or tiles.
+    /// Decodes the next row of strips or tiles. Only that one is held: some files have all rows in one strip.
     fn decode_next(&mut self) -> Result<(), TextureError> {
         let (chunk_width, chunk_height) = self.decoder.chunk_dimensions();
-        let (chunk_width, chunk_height) = (chunk_width as usize, chunk_height as usize);
-        let across = self.width.div_ceil(chunk_width);
-        let rows = chunk_height.min(self.height - self.decoded);
-        let first = self.pending[0].len();
-        self.pending.iter_mut().for_each(|p| p.resize(first + rows * self.width, f32::NAN));
-        for column in 0..across {
-            let index = (self.decoded / chunk_height * across + column) as u32;
-            let chunk = self.decoder.read_chunk(index);
-            let chunk = chunk.map_err(|e| TextureError::undecodable(&self.path, truncated(&e)))?;
-            let (wide, high) = self.decoder.chunk_data_dimensions(index);
-            let (wide, high) = (wide as usize, high as usize);
-            let value: Box<dyn Fn(usize) -> f32> = match chunk {
-                DecodingResult::U8(v) => Box::new(move |i| f32::from(v[i]) / 255.0),
-                DecodingResult::U16(v) => Box::new(move |i| f32::from(v[i]) / 65535.0),
-                DecodingResult::F16(v) => Box::new(move |i| v[i].to_f32()),
-                DecodingResult::F32(v) => Box::new(move |i| v[i]),
+        let across = self.width.div_ceil(chunk_width as usize);
+        let first = self.rows.end / chunk_height as usize * across;
+        self.chunks.clear();
+        for index in first..first + across {
+            let chunk = self.decoder.read_chunk(index as u32);
+            self.chunks.push(chunk.map_err(|e| TextureError::undecodable(&self.path, truncated(&e)))?);
+        }
+        self.rows = self.rows.end..(self.rows.end + chunk_height as usize).min(self.height);
+        Ok(())
+    }
+
+    /// A row of one channel.
+    fn copy(&self, y: usize, channel: usize, plane: &mut Vec<f32>) -> Result<(), TextureError> {
+        let chunk_width = self.decoder.chunk_dimensions().0 as usize;
+        for (column, chunk) in self.chunks.iter().enumerate() {
+            let wide = chunk_width.min(self.width - column * chunk_width);
+            let first = (y - self.rows.start) * wide * self.samples;
+            let samples = first + channel..first + wide * self.samples;
+            let missing = || TextureError::undecodable(&self.path, format!("it is truncated at row {y}"));
+            macro_rules! extend {
+                ($values:expr, $convert:expr) => {{
+                    let values = $values.get(samples).ok_or_else(missing)?;
+                    plane.extend(values.iter().step_by(self.samples).map($convert));
+                }};
+            }
+            match chunk {
+                DecodingResult::U8(v) => extend!(v, |v| f32::from(*v) / 255.0),
+                DecodingResult::U16(v) => extend!(v, |v| f32::from(*v) / 65535.0),
+                DecodingResult::F16(v) => extend!(v, |v| v.to_f32()),
+                DecodingResult::F32(v) => extend!(v, |v| *v),
                 _ => return Err(TextureError::undecodable(&self.path, "its samples are of several kinds")),
-            };
-            for y in 0..high.min(rows) {
-                for (channel, plane) in self.pending.iter_mut().enumerate() {
-                    let to = first + y * self.width + column * chunk_width;
-                    for (x, to) in plane[to..to + wide].iter_mut().enumerate() {
-                        *to = value((y * wide + x) * self.samples + channel);
-                    }
-                }
             }
         }
-        self.decoded += rows;
         Ok(())
     }
 }
 
 impl Bands for TiffBands {
     fn read(&mut self, rows: Range<usize>, planes: &mut [Vec<f32>]) -> Result<(), TextureError> {
-        while self.decoded < rows.end {
-            self.decode_next()?;
-        }
-        for (plane, pending) in planes.iter_mut().zip(&mut self.pending) {
-            plane.clear();
-            plane.extend(pending.drain(..rows.len() * self.width));
+        planes.iter_mut().for_each(Vec::clear);
+        for y in rows {
+            while y >= self.rows.end {
+                self.decode_next()?;
+            }
+            for (channel, plane) in planes.iter_mut().enumerate() {
+                self.copy(y, channel, plane)?;
+            }
         }
         Ok(())
     }
