@@ -236,3 +236,40 @@ fn interlaced_pngs_palettes_and_alpha() {
 
 use ::exr;
 use ::png;
+
+#[test]
+fn tiled_tiffs_are_read() {
+    use ::tiff::encoder::TiffEncoder;
+    use ::tiff::tags::Tag;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.tif");
+    let (width, height) = (20usize, 37usize);
+    let at = |x: usize, y: usize| if x < width && y < height { (x * 11 + y * 3) as u8 } else { 255 };
+    for tile in [16usize, 48] {
+        let mut encoder = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
+        let mut directory = encoder.image_directory().unwrap();
+        let (across, down) = (width.div_ceil(tile), height.div_ceil(tile));
+        let mut offsets = Vec::new();
+        for index in 0..across * down {
+            let (left, top) = (index % across * tile, index / across * tile);
+            let bytes: Vec<u8> = (0..tile * tile).map(|i| at(left + i % tile, top + i / tile)).collect();
+            offsets.push(directory.write_data(&bytes[..]).unwrap() as u32);
+        }
+        directory.write_tag(Tag::ImageWidth, width as u32).unwrap();
+        directory.write_tag(Tag::ImageLength, height as u32).unwrap();
+        directory.write_tag(Tag::BitsPerSample, 8u16).unwrap();
+        directory.write_tag(Tag::Compression, 1u16).unwrap();
+        directory.write_tag(Tag::PhotometricInterpretation, 1u16).unwrap();
+        directory.write_tag(Tag::TileWidth, tile as u32).unwrap();
+        directory.write_tag(Tag::TileLength, tile as u32).unwrap();
+        directory.write_tag(Tag::TileOffsets, &offsets[..]).unwrap();
+        directory.write_tag(Tag::TileByteCounts, &vec![(tile * tile) as u32; offsets.len()][..]).unwrap();
+        directory.finish().unwrap();
+        for step in [1, 7, 16, 37] {
+            let planes = read_all(&path, step).unwrap().1;
+            let right =
+                (0..width * height).all(|i| planes[0][i] == f32::from(at(i % width, i / width)) / 255.0);
+            assert!(right, "tiles of {tile}, bands of {step}");
+        }
+    }
+}
