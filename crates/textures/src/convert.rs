@@ -31,7 +31,7 @@ pub struct Request<'a> {
     pub clamp: bool,
     /// The folder for the maps and `material.json`.
     pub folder: PathBuf,
-    /// Rows that are mapped together; as many as make two million texels if `None`.
+    /// Rows that are mapped together; as many as make a million texels if `None`.
     pub band_rows: Option<usize>,
 }
 
@@ -134,9 +134,9 @@ fn base(request: &Request) -> Result<Material, TextureError> {
     Ok(base)
 }
 
-/// Two million texels, in whole blocks of whatever a file is made of.
+/// A million texels, in whole blocks of whatever a file is made of.
 fn band_rows(width: usize) -> usize {
-    ((1 << 21) / width).next_multiple_of(64).max(64)
+    ((1 << 20) / width).next_multiple_of(64).max(64)
 }
 
 /// Opens the first tile of each texture, and decides how it is encoded.
