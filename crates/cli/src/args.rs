@@ -309,7 +309,29 @@ pub(crate) struct ApplyArgs {
     #[arg(long)]
     pub(crate) clamp: bool,
     #[command(flatten)]
+    pub(crate) textures: TextureArgs,
+    #[command(flatten)]
     pub(crate) json: Json,
+}
+
+/// Maps of source parameters, instead of one value for each.
+#[derive(Args)]
+pub(crate) struct TextureArgs {
+    /// A source parameter's texture: .png, .tif or .exr; <UDIM> or 1001 in its name for all tiles. May be repeated
+    #[arg(long, value_name = "NAME=FILE", requires = "output")]
+    pub(crate) texture: Vec<String>,
+    /// A source parameter that is the same for all texels; as NAME=VALUE alone
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub(crate) fix: Vec<String>,
+    /// How a texture is encoded: linear or srgb, instead of what is taken for granted
+    #[arg(long, value_name = "NAME=ENCODING", requires = "texture")]
+    pub(crate) encoding: Vec<String>,
+    /// Format of the maps, instead of the textures': png8, png16, tiff8, tiff16, tiff-half, tiff-float, exr-half, exr-float
+    #[arg(long, requires = "texture")]
+    pub(crate) format: Option<String>,
+    /// Folder for the maps of the target's parameters and material.json; made if it does not exist
+    #[arg(short, long, value_name = "FOLDER", requires = "texture")]
+    pub(crate) output: Option<PathBuf>,
 }
 
 #[derive(Args)]

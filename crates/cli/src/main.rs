@@ -21,6 +21,7 @@ use args::{Arguments, Command};
 use lookmatch_materials::MaterialError;
 use lookmatch_remap::RemapError;
 use lookmatch_renderers::InstallationError;
+use lookmatch_textures::TextureError;
 
 /// Pictures come and go by the thousand. This allocator keeps their memory; the system's hands it back to the kernel, and
 /// every page of the next picture costs a fault again.
@@ -85,6 +86,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
             .downcast_ref::<InstallationError>()
             .is_some_and(|e| matches!(e, InstallationError::Unknown { .. }))
         || error.downcast_ref::<MaterialError>().is_some_and(MaterialError::is_usage)
-        || error.downcast_ref::<RemapError>().is_some_and(RemapError::is_usage);
+        || error.downcast_ref::<RemapError>().is_some_and(RemapError::is_usage)
+        || error.downcast_ref::<TextureError>().is_some_and(TextureError::is_usage);
     if usage { 2 } else { 1 }
 }

@@ -8,10 +8,13 @@ use crate::args::ApplyArgs;
 use crate::output::{print, print_json};
 
 pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
+    if !args.textures.texture.is_empty() {
+        return super::apply_textures::run(args);
+    }
     let probe = Probe::read(&args.probe)?;
     let mut source = probe.from.clone();
     let mut named = Vec::new();
-    for text in &args.values {
+    for text in args.values.iter().chain(&args.textures.fix) {
         let (name, value) =
             text.split_once('=').ok_or_else(|| Usage(format!("'{text}' is not NAME=VALUE")))?;
         let indices = source.model().resolve(name.trim())?;

@@ -1,6 +1,7 @@
 //! One file for each command, and what several of them read from the command line.
 
 pub(crate) mod apply;
+pub(crate) mod apply_textures;
 pub(crate) mod bench;
 pub(crate) mod cache;
 pub(crate) mod compare;

@@ -1,0 +1,22 @@
+//! Textures of material parameters through a probe: from maps of a source's parameters to maps of its target's.
+//!
+//! A probe is baked into tables ([`Lut`]), which say what [`lookmatch_remap::apply`] would for each texel. Files are read, mapped
+//! and written in bands of rows, by a thread for each file ([`convert`]).
+
+mod bake;
+mod convert;
+mod encoding;
+mod error;
+mod files;
+mod lut;
+mod report;
+mod stream;
+mod udim;
+
+pub use bake::TOLERANCE;
+pub use convert::{Request, convert};
+pub use encoding::Encoding;
+pub use error::TextureError;
+pub use files::{Container, Depth, Format};
+pub use lut::{Between, Lut, LutError, MAX_INPUTS};
+pub use report::Report;
