@@ -3,9 +3,12 @@
 pub(crate) mod apply;
 pub(crate) mod bench;
 pub(crate) mod compare;
+pub(crate) mod compose;
 pub(crate) mod cross;
 pub(crate) mod eval;
+pub(crate) mod fit;
 pub(crate) mod inspect;
+pub(crate) mod invert;
 pub(crate) mod lint;
 pub(crate) mod match_pictures;
 pub(crate) mod models;
