@@ -5,7 +5,7 @@ use lookmatch_search::Axis;
 use serde::Serialize;
 
 use crate::fit::Fit;
-use crate::{Probe, RemapError};
+use crate::{Entry, Probe, RemapError};
 
 /// A target material for a source material.
 #[derive(Clone, Debug, Serialize)]
@@ -135,13 +135,25 @@ pub(crate) fn read(probe: &Probe, fit: Option<&Fit>, point: &[f64]) -> Result<Re
             .extend(entry.saturated.iter().filter(|n| !saturated.contains(n)).cloned().collect::<Vec<_>>());
     }
     if weights == 0.0 {
-        return Err(RemapError::Option(format!("the probe has no result around {point:?}")));
+        let near = nearest_found(probe, &places);
+        let near = near.ok_or_else(|| RemapError::Option("the probe has no result at all".into()))?;
+        (fitness, weights, body) = (near.fitness, 1.0, near.body);
     }
     // Sums of products leave noise in the last digits: 0.30000000000000004.
     let round = |v: f64| (v * 1e12).round() / 1e12;
-    let values = values.iter().zip(&smooth).map(|(v, smooth)| smooth.unwrap_or(round(*v))).collect();
+    let values = values.iter().zip(&smooth).map(|(v, smooth)| round(smooth.unwrap_or(*v))).collect();
     let body = body.map(|gain| gain.map(|g| g / weights));
     Ok(Reading { values, is_smooth, is_outside, fitness: fitness / weights, body, saturated })
+}
+
+/// The nearest entry that has a result, by steps between levels.
+fn nearest_found<'a>(probe: &'a Probe, places: &[Place]) -> Option<&'a Entry> {
+    let steps = |place: &usize| -> usize {
+        let indices = probe.indices(*place);
+        indices.iter().zip(places).map(|(i, place)| i.abs_diff(place.index)).sum()
+    };
+    let found = (0..probe.entries.len()).filter(|place| probe.entries[*place].failed.is_none());
+    found.min_by_key(steps).map(|place| &probe.entries[place])
 }
 
 /// The value of an axis in a material; all parameters behind an alias must agree.

@@ -131,8 +131,10 @@ impl<'a> Forward<'a> {
         let all: Vec<usize> = (0..probe.target_axes.len()).collect();
         let reach = |k: &usize| Reach { name: probe.target_axes[*k].name.clone(), min: f64::MAX, max: f64::MIN };
         let mut forward = Self { probe, reach: all.iter().map(reach).collect(), varying: all };
-        for start in starts {
-            let values = forward.target(start)?.0.values;
+        let readings = starts.iter().map(|start| forward.target(start).map(|(reading, _)| reading.values));
+        let entries = probe.found().map(|entry| Ok(read(probe, probe.fit.as_ref(), &entry.source)?.values));
+        let all: Vec<Vec<f64>> = readings.chain(entries).collect::<Result<_, RemapError>>()?;
+        for values in all {
             for (reach, value) in forward.reach.iter_mut().zip(values) {
                 (reach.min, reach.max) = (reach.min.min(value), reach.max.max(value));
             }

@@ -37,7 +37,9 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
             let wrong = format!("'{}' starts from {taken}, but what goes into it is {given}", file.display());
             return Err(Usage(wrong).into());
         }
-        applied = Applied { source: applied.source, ..through(&next, &applied.target, args)? };
+        let on = through(&next, &applied.target, args)?;
+        // Differences along a chain add up to no more than their sum.
+        applied = Applied { source: applied.source, fitness: applied.fitness + on.fitness, ..on };
     }
     if args.json.json {
         return print_json(&json!({

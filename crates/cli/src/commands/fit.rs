@@ -126,18 +126,18 @@ fn rows_of(parameter: &ParameterFit) -> Vec<Vec<String>> {
 fn reasons(parameter: &ParameterFit) -> String {
     let name = &parameter.name;
     let mut text = format!("  {name}: {}\n", parameter.why);
-    if let [only] = &parameter.depends_on[..]
-        && parameter.alternatives.iter().any(|a| a.depends_on.len() > 1)
-    {
+    if parameter.alternatives.len() > 2 {
         let told = |a: &lookmatch_remap::Alternative| {
             let from = if a.depends_on.is_empty() { "nothing".into() } else { a.depends_on.join(" and ") };
             format!("{:.2} from {from}", a.steps)
         };
         let all: Vec<String> = parameter.alternatives.iter().map(told).collect();
-        text += &format!(
-            "  {name} is a function of {only} alone: foretold to lattice steps of {}\n",
-            all.join(", ")
-        );
+        let depends = match &parameter.depends_on[..] {
+            [] => "depends on no source parameter".to_owned(),
+            [only] => format!("is a function of {only} alone"),
+            several => format!("depends on {}", several.join(" and ")),
+        };
+        text += &format!("  {name} {depends}: left-out entries are foretold to lattice steps of {}\n", all.join(", "));
     }
     if !parameter.light.is_empty() || !parameter.outside.is_empty() {
         text += &format!(

@@ -50,7 +50,8 @@ pub(crate) fn derived_text(probe: &Probe) -> String {
     };
     let mut text = format!("{kind} of {}: {} -> {}\n", derived.of.join(" and "), probe.from, probe.to);
     for axis in &probe.source_axes {
-        text += &format!("  takes {} from {} to {}\n", axis.name, axis.value(0), axis.value(axis.len() - 1));
+        let (min, max) = (axis.value(0), axis.value(axis.len() - 1));
+        text += &format!("  takes {} from {min:.5} to {max:.5}\n", axis.name);
     }
     let failed = probe.entries.len() - probe.found().count();
     if failed > 0 {

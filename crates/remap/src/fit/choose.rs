@@ -11,13 +11,15 @@ use super::{Alternative, Candidate, FitForm, ParameterFit, Residual};
 const BOUND: f64 = 2.0;
 /// or, where the table itself foretells them no better, by no more than this share of the values found.
 const SHARE: f64 = 0.02;
-/// A parameter does not depend on what improves the prediction by less than this factor, or on what leaves less than so many
-/// lattice steps.
+/// A parameter does not depend on what improves the prediction by less than this factor, nor on what improves it by less than
+/// twice where it is right to so many lattice steps without.
 const BETTER: f64 = 1.1;
 const INDEPENDENT: f64 = 1.0;
+/// Root mean square that rounding to the lattice leaves, in lattice steps: 1/√12.
+const ROUNDING: f64 = 0.29;
 /// Of two closed forms the simpler one is taken unless the other is better by [`BETTER`] and by these lattice steps: less than
-/// the rounding to the lattice leaves (1/√12).
-const SIMPLER: f64 = 0.25;
+/// the rounding to the lattice leaves.
+const SIMPLER: f64 = 0.1;
 /// Highest total degree of a polynomial, and most of its terms.
 const DEGREE: u32 = 6;
 const TERMS: usize = 28;
@@ -111,7 +113,8 @@ fn choose(data: &Data, folds: &[Vec<usize>], fit: &mut ParameterFit) {
         .collect();
     let least = |scored: &[Scored]| scored.iter().map(|s| s.score).fold(f64::INFINITY, f64::min);
     let best = scored.iter().map(|(_, scored)| least(scored)).fold(f64::INFINITY, f64::min);
-    let enough = (BETTER * best).max(INDEPENDENT * data.step);
+    let step = data.step;
+    let enough = (BETTER * best).max((2.0 * best).clamp(ROUNDING * step, INDEPENDENT * step));
     fit.alternatives = scored.iter().map(|(s, scored)| s.alternative(least(scored))).collect();
     let simplest = scored.iter().filter(|(_, scored)| least(scored) <= enough);
     let size = |(subset, _): &&(Subset, Vec<Scored>)| subset.axes.len();
@@ -126,7 +129,9 @@ fn choose(data: &Data, folds: &[Vec<usize>], fit: &mut ParameterFit) {
     fit.local = lowest(&local).and_then(|s| subset.candidate(&s));
     // The simplest of the good ones that can be made, else the next.
     let good = (BETTER * least(&closed)).max(SIMPLER * data.step + least(&closed));
-    let mut closed = closed;
+    // Nor is anything good that a monotone one cannot come near.
+    let fair = (2.0 * least(&closed)).max(BOUND * data.step);
+    let mut closed: Vec<Scored> = closed.into_iter().filter(|s| s.score <= fair).collect();
     closed.sort_by(|a, b| (a.score > good).cmp(&(b.score > good)).then(a.size.cmp(&b.size)));
     fit.closed = closed.iter().find_map(|s| subset.candidate(s));
     let table = table_score(data, folds);

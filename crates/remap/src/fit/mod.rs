@@ -9,6 +9,8 @@ mod data;
 mod form;
 mod regression;
 mod rerender;
+#[cfg(test)]
+mod tests;
 
 use serde::{Deserialize, Serialize};
 

@@ -6,6 +6,10 @@ use super::form::{Shape, Term, monomial};
 
 /// Eigenvalues of the normal equations below this share of the largest belong to directions that the data do not tell.
 const RANK: f64 = 1e-12;
+/// Columns whose squares add up to less than this share of the largest sum are zero but for rounding.
+const EMPTY: f64 = 1e-18;
+/// Distances that differ by less, in `u`, are the same.
+const SAME: f64 = 1e-9;
 
 /// Data of one target parameter: places in `u`, values and weights above 0.
 #[derive(Clone, Debug, Default)]
@@ -47,7 +51,9 @@ pub(crate) fn least_squares(rows: &[Vec<f64>], y: &[f64], w: &[f64]) -> Vec<f64>
             }
         }
     }
-    let norm: Vec<f64> = (0..n).map(|i| gram[(i, i)].sqrt()).map(|v| if v > 0.0 { 1.0 / v } else { 0.0 }).collect();
+    let largest = (0..n).map(|i| gram[(i, i)]).fold(0.0f64, f64::max);
+    let inverse = |square: f64| if square > EMPTY * largest { 1.0 / square.sqrt() } else { 0.0 };
+    let norm: Vec<f64> = (0..n).map(|i| inverse(gram[(i, i)])).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| gram[(i.max(j), i.min(j))] * norm[i] * norm[j]);
     let right = DVector::from_fn(n, |i, _| right[i] * norm[i]);
     let eigen = scaled.symmetric_eigen();
@@ -104,8 +110,17 @@ pub(crate) fn loess(samples: &Samples, window: Window, at: &[f64]) -> f64 {
     let distances: Vec<f64> = samples.u.iter().map(|u| squared(u).sqrt()).collect();
     let mut order = distances.clone();
     let (_, reach, _) = order.select_nth_unstable_by(count - 1, f64::total_cmp);
-    // The farthest neighbour and all as far as it count a little, so that no place of a lattice is left with too few.
-    let reach = 1.1 * reach.max(1e-9);
+    let mut reach = *reach;
+    // On a lattice the nearest may all have one place: a line needs two distances, a parabola three.
+    while distinct(&distances, reach) <= window.degree as usize {
+        let next = distances.iter().copied().filter(|d| *d > reach + SAME).fold(f64::INFINITY, f64::min);
+        if next.is_infinite() {
+            break;
+        }
+        reach = next;
+    }
+    // The farthest neighbour and all as far as it count a little.
+    let reach = 1.1 * reach.max(SAME);
     let (mut rows, mut y, mut w) = (Vec::new(), Vec::new(), Vec::new());
     for k in (0..samples.len()).filter(|k| distances[*k] < reach) {
         let local: Vec<f64> = samples.u[k].iter().zip(at).map(|(a, b)| (a - b) / reach).collect();
@@ -118,6 +133,17 @@ pub(crate) fn loess(samples: &Samples, window: Window, at: &[f64]) -> f64 {
         return y[0];
     }
     least_squares(&rows, &y, &w)[0]
+}
+
+/// Distances up to a reach that differ, at most three.
+fn distinct(distances: &[f64], reach: f64) -> usize {
+    let mut seen: Vec<f64> = Vec::new();
+    for distance in distances.iter().filter(|d| **d <= reach + SAME) {
+        if seen.len() < 3 && seen.iter().all(|other| (other - distance).abs() > SAME) {
+            seen.push(*distance);
+        }
+    }
+    seen.len()
 }
 
 /// Slopes of the cubic spline through some values that rises and falls only where they do (Fritsch and Butland 1984, as in PCHIP).
@@ -189,6 +215,22 @@ mod tests {
             let quadratic = loess(&bowl, Window { span: 0.5, degree: 2 }, &at);
             let truth = 1.0 + at[0] * at[0] - 0.5 * at[0] * at[1] + 0.2 * at[1];
             assert!((quadratic - truth).abs() < 1e-9, "{at:?}: {quadratic} for {truth}");
+        }
+    }
+
+    #[test]
+    fn replicates_of_few_places_are_averaged() {
+        let mut samples = Samples::default();
+        for (u, y) in [-1.0, -1.0 + 1e-16, 0.0, 1e-16, 1.0, 1.0].into_iter().zip([0.0, 0.2, 1.0, 1.2, 2.0, 2.2]) {
+            samples.u.push(vec![u]);
+            samples.y.push(y);
+            samples.w.push(1.0);
+        }
+        for (at, truth) in [(-1.0, 0.1), (0.0, 1.1), (0.5, 1.6), (1.0, 2.1)] {
+            for (span, degree) in [(0.01, 1), (0.5, 1), (0.01, 2), (1.0, 2)] {
+                let value = loess(&samples, Window { span, degree }, &[at]);
+                assert!((value - truth).abs() < 1e-6, "{at} {span} {degree}: {value}");
+            }
         }
     }
 
