@@ -81,7 +81,8 @@ pub(crate) fn draw(probe: &Probe, path: &Path) -> anyhow::Result<()> {
         drop(root);
         png(&pixels, size)?
     };
-    write_atomically(path, |out| out.write_all(&bytes)).with_context(|| format!("cannot write '{}'", path.display()))
+    write_atomically(path, |out| out.write_all(&bytes))
+        .with_context(|| format!("cannot write '{}'", path.display()))
 }
 
 /// The font that comes with the program: systems differ in theirs, and some have none.
@@ -117,7 +118,8 @@ fn rows(probe: &Probe) -> anyhow::Result<Vec<Vec<Panel>>> {
     let title = |k: usize, what: &str| format!("{} – {what}", label(&probe.to, &probe.target_axes[k].name));
     let mut first = Vec::new();
     for (k, axis) in probe.target_axes.iter().enumerate() {
-        let mut panel = panel(probe, &scales, &all(probe), title(k, "table"), target(probe, axis)?, &|e| e.target[k]);
+        let mut panel =
+            panel(probe, &scales, &all(probe), title(k, "table"), target(probe, axis)?, &|e| e.target[k]);
         if scales.len() == 1 {
             (panel.title, panel.curve) = (title(k, &form(probe, k)), curve(probe, &scales[0], k));
         }
@@ -130,13 +132,26 @@ fn rows(probe: &Probe) -> anyhow::Result<Vec<Vec<Panel>>> {
         let Some(function) = parameter.function() else { continue };
         let fine: Vec<Vec<f64>> = scales.iter().map(fine).collect();
         let at = |place: usize| -> Vec<f64> {
-            [fine[0][place / FINE], fine[1][place % FINE]].iter().zip(&scales).map(|(t, s)| s.value(*t)).collect()
+            [fine[0][place / FINE], fine[1][place % FINE]]
+                .iter()
+                .zip(&scales)
+                .map(|(t, s)| s.value(*t))
+                .collect()
         };
         let values = (0..FINE * FINE).map(|place| function.at(probe, &at(place))).collect();
         let axes = scales.iter().zip(fine).map(|(s, centres)| Ruler { centres, ..s.clone() }).collect();
         let Panel { range, is_log, .. } = first[k];
         let title = title(k, &parameter.describe());
-        second.push(Panel { title, axes, values, range, is_log, is_error: false, curve: vec![], marks: vec![] });
+        second.push(Panel {
+            title,
+            axes,
+            values,
+            range,
+            is_log,
+            is_error: false,
+            curve: vec![],
+            marks: vec![],
+        });
     }
     Ok(if second.is_empty() { vec![first] } else { vec![first, second] })
 }
@@ -152,7 +167,8 @@ fn slices(probe: &Probe, scales: &[Ruler]) -> anyhow::Result<Vec<Vec<Panel>>> {
         at[cut - 1] = probe.source_axes[cut - 1].value(*level);
         let places: Vec<usize> =
             (0..probe.entries.len()).filter(|p| probe.entries[*p].source[..cut] == at[..]).collect();
-        let names = probe.source_axes[..cut].iter().zip(&at).map(|(a, v)| format!("{} {}", a.name, short(*v)));
+        let names =
+            probe.source_axes[..cut].iter().zip(&at).map(|(a, v)| format!("{} {}", a.name, short(*v)));
         let names: Vec<String> = names.collect();
         let mut panels = Vec::new();
         for (k, axis) in probe.target_axes.iter().enumerate() {
@@ -212,7 +228,16 @@ fn panel(
         if entry.failed.is_some() { f64::NAN } else { value(entry) }
     };
     let values = places.iter().map(of).collect();
-    Panel { title, axes: scales.to_vec(), values, range, is_log, is_error: false, curve: vec![], marks: vec![] }
+    Panel {
+        title,
+        axes: scales.to_vec(),
+        values,
+        range,
+        is_log,
+        is_error: false,
+        curve: vec![],
+        marks: vec![],
+    }
 }
 
 /// A parameter with its unit.
@@ -290,7 +315,12 @@ fn figure<B: DrawingBackend>(probe: &Probe, root: &Area<B>, rows: &[Vec<Panel>],
     title.draw(&Text::new(headline, at(14, 8), font(20))).map_err(told)?;
     let flags = flags(probe);
     let held: Vec<String> = flags.iter().map(|(_, name, count)| format!("{name}: {count}")).collect();
-    let details = format!("{} entries{}{}", probe.entries.len(), if held.is_empty() { "" } else { "; " }, held.join(", "));
+    let details = format!(
+        "{} entries{}{}",
+        probe.entries.len(),
+        if held.is_empty() { "" } else { "; " },
+        held.join(", ")
+    );
     title.draw(&Text::new(details, at(14, 38), font(13))).map_err(told)?;
     let legend = marks_legend(&flags);
     for (k, (flag, name)) in legend.iter().enumerate() {
@@ -325,7 +355,11 @@ fn flags(probe: &Probe) -> Vec<(Flag, &'static str, usize)> {
 }
 
 fn marks_legend(flags: &[(Flag, &'static str, usize)]) -> Vec<(Flag, String)> {
-    flags.iter().filter(|(flag, ..)| *flag != Flag::Failed).map(|(flag, name, _)| (*flag, (*name).into())).collect()
+    flags
+        .iter()
+        .filter(|(flag, ..)| *flag != Flag::Failed)
+        .map(|(flag, name, _)| (*flag, (*name).into()))
+        .collect()
 }
 
 /// A mark of a flag, around a pixel.
@@ -417,7 +451,10 @@ fn colour_bar<B: DrawingBackend>(
         .label_style(("sans-serif", (11 * scale) as f64))
         .draw()?;
     chart.draw_series((0..STEPS).map(|k| {
-        Rectangle::new([(0.0, at(k)), (1.0, at(k + 1))], colour(panel, back((at(k) + at(k + 1)) / 2.0)).filled())
+        Rectangle::new(
+            [(0.0, at(k)), (1.0, at(k + 1))],
+            colour(panel, back((at(k) + at(k + 1)) / 2.0)).filled(),
+        )
     }))?;
     Ok(())
 }
@@ -458,7 +495,11 @@ fn line<B: DrawingBackend>(
     Ok(())
 }
 
-type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>>;
+type Chart<'a, B> = ChartContext<
+    'a,
+    B,
+    Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
+>;
 
 /// The axes of a panel with their names and numbers.
 fn mesh<B: DrawingBackend>(

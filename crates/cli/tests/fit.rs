@@ -1,13 +1,27 @@
 //! From tables to smooth functions, inverses, chains and pictures of probes, as a user makes them.
 
+#[allow(dead_code, reason = "other tests keep no light")]
 mod support;
 
 use std::path::Path;
+use std::process::Output;
 
 use serde_json::Value as Json;
 use tempfile::TempDir;
 
-use support::{json, lookmatch, refused};
+use support::{program, refused};
+
+/// The program; light that it prepares is kept for the other commands of a test.
+fn lookmatch(folder: &Path, arguments: &[&str]) -> Output {
+    program(folder).env("LOOKMATCH_CACHE", folder.join("light")).args(arguments).output().unwrap()
+}
+
+/// Runs a command that must succeed and print one JSON document.
+fn json(folder: &Path, arguments: &[&str]) -> Json {
+    let output = lookmatch(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
 
 /// A probe of 5 × 5 source points from tiny pictures.
 fn remap(folder: &Path, from: &str, to: &str, output: &str) -> Json {
@@ -50,7 +64,10 @@ fn a_probe_is_fitted_inverted_and_composed() {
     let number = |applied: &Json, name: &str| applied["target"][name].as_f64().unwrap();
     assert!((number(&new, "roughness_u") - number(&old, "roughness_u")).abs() < 0.03);
     let told = lookmatch(of, &["apply", "ab.json", "specular=0.1", "roughness=0.25"]);
-    assert!(String::from_utf8_lossy(&told.stderr).contains("roughness: polynomial"), "says which form gave it");
+    assert!(
+        String::from_utf8_lossy(&told.stderr).contains("roughness: polynomial"),
+        "says which form gave it"
+    );
 
     // What a remap fits is what `fit` fits.
     json(of, &["fit", "old.json", "-o", "again.json", "--json"]);

@@ -46,7 +46,12 @@ pub fn apply_table(probe: &Probe, source: &Material, clamp: bool) -> Result<Appl
     apply_with(probe, None, source, clamp)
 }
 
-fn apply_with(probe: &Probe, fit: Option<&Fit>, source: &Material, clamp: bool) -> Result<Applied, RemapError> {
+fn apply_with(
+    probe: &Probe,
+    fit: Option<&Fit>,
+    source: &Material,
+    clamp: bool,
+) -> Result<Applied, RemapError> {
     let (mut clamped, mut point) = (Vec::new(), Vec::new());
     for axis in &probe.source_axes {
         let value = axis_value(source, axis)?;
@@ -68,7 +73,15 @@ fn apply_with(probe: &Probe, fit: Option<&Fit>, source: &Material, clamp: bool) 
     });
     let outside = (0..values.len()).filter(|k| is_smooth[*k] && is_outside[*k]);
     let outside_fit = outside.map(|k| probe.target_axes[k].name.clone()).collect();
-    Ok(Applied { source: source.clone(), target, fitness, saturated, clamped, forms: forms.collect(), outside_fit })
+    Ok(Applied {
+        source: source.clone(),
+        target,
+        fitness,
+        saturated,
+        clamped,
+        forms: forms.collect(),
+        outside_fit,
+    })
 }
 
 /// What a probe says at a point of its source axes.

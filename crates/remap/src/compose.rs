@@ -42,7 +42,9 @@ pub fn compose(first: &Probe, second: &Probe, clamp: bool) -> Result<Probe, Rema
     let unreachable = (0..places.len()).filter(|k| was_unreachable(&places[*k])).collect();
     let name = |probe: &Probe| format!("{} -> {}", probe.from.model().name, probe.to.model().name);
     let mut renderers = first.renderers.clone();
-    renderers.extend(second.renderers.iter().filter(|r| !first.renderers.iter().any(|o| o.name == r.name)).cloned());
+    renderers.extend(
+        second.renderers.iter().filter(|r| !first.renderers.iter().any(|o| o.name == r.name)).cloned(),
+    );
     let is_constrained = [first, second].iter().all(|probe| probe.strategy == Strategy::Constrained);
     let target_axes: Vec<Axis> = second.target_axes.clone();
     Ok(Probe {
@@ -89,7 +91,8 @@ fn composed(first: &Probe, second: &Probe, entry: &Entry, clamp: bool) -> Result
         Err(RemapError::Option(reason)) => return failed(reason),
         on => on?,
     };
-    let indices: Vec<usize> = second.source_axes.iter().zip(&point).map(|(axis, v)| axis.nearest(*v)).collect();
+    let indices: Vec<usize> =
+        second.source_axes.iter().zip(&point).map(|(axis, v)| axis.nearest(*v)).collect();
     let near = second.entry(&indices);
     let on_edge = there.saturated.iter().chain(outside.map(|(axis, _)| &axis.name));
     let mut saturated: Vec<String> =

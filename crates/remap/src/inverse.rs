@@ -54,7 +54,8 @@ pub fn invert(probe: &Probe) -> Result<Probe, RemapError> {
         .into_par_iter()
         .map(|place| forward.entry(&point(&from_axes, place), &starts, &images))
         .collect::<Result<_, RemapError>>()?;
-    let unreachable = found.iter().enumerate().filter(|(_, (_, is_reached))| !is_reached).map(|(k, _)| k).collect();
+    let unreachable =
+        found.iter().enumerate().filter(|(_, (_, is_reached))| !is_reached).map(|(k, _)| k).collect();
     let mut from = probe.to.clone();
     for (k, axis) in probe.target_axes.iter().enumerate().filter(|(k, _)| !forward.varying.contains(k)) {
         let first = probe.found().next().map_or(axis.value(0), |entry| entry.target[k]);
@@ -129,7 +130,8 @@ impl<'a> Forward<'a> {
             return refused("its source is a single material".into());
         }
         let all: Vec<usize> = (0..probe.target_axes.len()).collect();
-        let reach = |k: &usize| Reach { name: probe.target_axes[*k].name.clone(), min: f64::MAX, max: f64::MIN };
+        let reach =
+            |k: &usize| Reach { name: probe.target_axes[*k].name.clone(), min: f64::MAX, max: f64::MIN };
         let mut forward = Self { probe, reach: all.iter().map(reach).collect(), varying: all };
         let readings = starts.iter().map(|start| forward.target(start).map(|(reading, _)| reading.values));
         let entries = probe.found().map(|entry| Ok(read(probe, probe.fit.as_ref(), &entry.source)?.values));
@@ -207,7 +209,8 @@ impl<'a> Forward<'a> {
     ) -> Result<(Entry, bool), RemapError> {
         let wanted = self.shares(target);
         let distance = |image: &[f64]| image.iter().zip(&wanted).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        let nearest = (0..starts.len()).min_by(|a, b| distance(&images[*a]).total_cmp(&distance(&images[*b])));
+        let nearest =
+            (0..starts.len()).min_by(|a, b| distance(&images[*a]).total_cmp(&distance(&images[*b])));
         let mut best = nearest.map(|k| starts[k].clone()).unwrap_or_default();
         let mut least = distance(&self.target(&best)?.1);
         let spacing = 1.0 / STARTS.powf(1.0 / best.len() as f64);
@@ -275,7 +278,8 @@ impl<'a> Forward<'a> {
 
 /// The entry of the nearest source point that has a result.
 fn nearest_entry<'a>(probe: &'a Probe, source: &[f64]) -> &'a Entry {
-    let indices: Vec<usize> = probe.source_axes.iter().zip(source).map(|(axis, v)| axis.nearest(*v)).collect();
+    let indices: Vec<usize> =
+        probe.source_axes.iter().zip(source).map(|(axis, v)| axis.nearest(*v)).collect();
     let entry = probe.entry(&indices);
     if entry.failed.is_none() { entry } else { probe.found().next().unwrap_or(entry) }
 }

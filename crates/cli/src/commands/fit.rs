@@ -137,7 +137,10 @@ fn reasons(parameter: &ParameterFit) -> String {
             [only] => format!("is a function of {only} alone"),
             several => format!("depends on {}", several.join(" and ")),
         };
-        text += &format!("  {name} {depends}: left-out entries are foretold to lattice steps of {}\n", all.join(", "));
+        text += &format!(
+            "  {name} {depends}: left-out entries are foretold to lattice steps of {}\n",
+            all.join(", ")
+        );
     }
     if !parameter.light.is_empty() || !parameter.outside.is_empty() {
         text += &format!(

@@ -25,7 +25,8 @@ pub(crate) fn run(args: &InspectArgs) -> anyhow::Result<()> {
         summary["plot"] = json!(args.plot);
         return print_json(&summary);
     }
-    let more = [sureness(&probe), fit_text(&probe), derived_text(&probe)].map(|t| if t.is_empty() { t } else { t + "\n" });
+    let more = [sureness(&probe), fit_text(&probe), derived_text(&probe)]
+        .map(|t| if t.is_empty() { t } else { t + "\n" });
     print(&format!("{}\n{}parameters of the source:\n{}", text(&probe), more.concat(), loss_table(&losses)))
 }
 
@@ -50,7 +51,8 @@ fn sureness(probe: &Probe) -> String {
 /// The entries that are less than sure.
 fn flagged(probe: &Probe) -> Vec<serde_json::Value> {
     let flagged = (0..probe.entries.len()).map(|place| (place, probe.flags(place)));
-    let told = |(place, flags): (usize, Vec<Flag>)| json!({ "source": probe.entries[place].source, "flags": flags });
+    let told =
+        |(place, flags): (usize, Vec<Flag>)| json!({ "source": probe.entries[place].source, "flags": flags });
     flagged.filter(|(_, flags)| !flags.is_empty()).map(told).collect()
 }
 

@@ -25,7 +25,9 @@ pub(crate) fn run(args: &InvertArgs) -> anyhow::Result<()> {
 /// Renders the entries of a derived probe, where both models are ours.
 pub(crate) fn measured(probe: &mut Probe) -> anyhow::Result<()> {
     if [&probe.from, &probe.to].iter().any(|material| material.model().renderer.is_some()) {
-        eprintln!("note: not rendered, one of the models is another renderer's: errors are those of the probes it is made of");
+        eprintln!(
+            "note: not rendered, one of the models is another renderer's: errors are those of the probes it is made of"
+        );
         return Ok(());
     }
     let stage = stage_of(probe)?;
@@ -37,7 +39,8 @@ pub(crate) fn measured(probe: &mut Probe) -> anyhow::Result<()> {
 
 /// The range of each source axis.
 pub(crate) fn domain(probe: &Probe) -> serde_json::Value {
-    let axis = |a: &lookmatch_remap::Axis| json!({ "name": a.name, "min": a.value(0), "max": a.value(a.len() - 1) });
+    let axis =
+        |a: &lookmatch_remap::Axis| json!({ "name": a.name, "min": a.value(0), "max": a.value(a.len() - 1) });
     probe.source_axes.iter().map(axis).collect()
 }
 
@@ -55,7 +58,10 @@ pub(crate) fn derived_text(probe: &Probe) -> String {
     }
     let failed = probe.entries.len() - probe.found().count();
     if failed > 0 {
-        text += &format!("  {failed} of {} entries lead out of what the second probe takes\n", probe.entries.len());
+        text += &format!(
+            "  {failed} of {} entries lead out of what the second probe takes\n",
+            probe.entries.len()
+        );
     }
     if !derived.unreachable.is_empty() {
         text += &format!(

@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
-use crate::commands::fit::{FIT_POINTS, fit_to, fit_text};
+use crate::commands::fit::{FIT_POINTS, fit_text, fit_to};
 use crate::commands::{check_output, create_folder};
 use crate::output::{bar, loss_table, noise_text, print_json};
 use crate::renderers::{Renderers, interruption, renderer_of};

@@ -17,8 +17,8 @@ const BETTER: f64 = 1.1;
 const INDEPENDENT: f64 = 1.0;
 /// Root mean square that rounding to the lattice leaves, in lattice steps: 1/√12.
 const ROUNDING: f64 = 0.29;
-/// Of two closed forms the simpler one is taken unless the other is better by [`BETTER`] and by these lattice steps: less than
-/// the rounding to the lattice leaves.
+/// Of two closed forms the simpler one is taken unless the other is better by these lattice steps: less than the rounding to the
+/// lattice leaves.
 const SIMPLER: f64 = 0.1;
 /// Highest total degree of a polynomial, and most of its terms.
 const DEGREE: u32 = 6;
@@ -95,7 +95,8 @@ pub(crate) fn fit(data: &Data) -> ParameterFit {
     if data.target_levels <= 2 {
         fit.why = "a switch: the nearest entry decides".into();
     } else if folds.iter().map(Vec::len).sum::<usize>() < LEAST {
-        fit.why = format!("fewer than {LEAST} entries have others on all sides, too few to tell a smooth relation");
+        fit.why =
+            format!("fewer than {LEAST} entries have others on all sides, too few to tell a smooth relation");
     } else {
         choose(data, &folds, &mut fit);
     }
@@ -128,7 +129,7 @@ fn choose(data: &Data, folds: &[Vec<usize>], fit: &mut ParameterFit) {
     let lowest = |of: &[Scored]| of.iter().copied().min_by(|a, b| a.score.total_cmp(&b.score));
     fit.local = lowest(&local).and_then(|s| subset.candidate(&s));
     // The simplest of the good ones that can be made, else the next.
-    let good = (BETTER * least(&closed)).max(SIMPLER * data.step + least(&closed));
+    let good = SIMPLER * data.step + least(&closed);
     // Nor is anything good that a monotone one cannot come near.
     let fair = (2.0 * least(&closed)).max(BOUND * data.step);
     let mut closed: Vec<Scored> = closed.into_iter().filter(|s| s.score <= fair).collect();
@@ -141,15 +142,23 @@ fn choose(data: &Data, folds: &[Vec<usize>], fit: &mut ParameterFit) {
 
 /// Takes the closed form if it is adequate, else the local regression, else the table.
 fn decide(data: &Data, fit: &mut ParameterFit) {
-    let (least, most) = data.samples.y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
+    let (least, most) =
+        data.samples.y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
     let is_adequate = |candidate: &&Candidate| {
         let score = candidate.residual.steps * data.step;
         let is_as_good = fit.table.is_some_and(|table| score <= table * data.step);
         score <= BOUND * data.step || is_as_good && score <= SHARE * (most - least)
     };
-    let best = [&fit.closed, &fit.local].into_iter().flatten().map(|c| c.residual.steps).fold(f64::INFINITY, f64::min);
+    let best = [&fit.closed, &fit.local]
+        .into_iter()
+        .flatten()
+        .map(|c| c.residual.steps)
+        .fold(f64::INFINITY, f64::min);
     let told = |c: &Candidate| format!("foretells left-out entries to {:.2} lattice steps", c.residual.steps);
-    (fit.form, fit.why) = match (fit.closed.as_ref().filter(is_adequate), fit.local.as_ref().filter(is_adequate)) {
+    (fit.form, fit.why) = match (
+        fit.closed.as_ref().filter(is_adequate),
+        fit.local.as_ref().filter(is_adequate),
+    ) {
         (Some(closed), _) => (FitForm::Closed, told(closed)),
         (None, Some(local)) => (FitForm::Local, format!("{}; no closed form is as good", told(local))),
         (None, None) => (
@@ -164,7 +173,8 @@ fn decide(data: &Data, fit: &mut ParameterFit) {
 
 /// All subsets of some axes, without the last two kinds where there are many: none, single ones, pairs, and all.
 fn subsets(axes: usize) -> Vec<Vec<usize>> {
-    let all = (0..1usize << axes.min(16)).map(|bits| (0..axes).filter(|k| bits >> k & 1 == 1).collect::<Vec<_>>());
+    let all =
+        (0..1usize << axes.min(16)).map(|bits| (0..axes).filter(|k| bits >> k & 1 == 1).collect::<Vec<_>>());
     let mut some: Vec<Vec<usize>> = all.filter(|s| axes <= 4 || s.len() <= 2 || s.len() == axes).collect();
     some.sort_by_key(Vec::len);
     some
@@ -185,7 +195,8 @@ fn folds(data: &Data) -> Vec<Vec<usize>> {
     if inner.len() <= SINGLY {
         return inner.into_iter().map(|k| vec![k]).collect();
     }
-    let fold = |f: usize| inner.iter().copied().filter(|k| (golden(*k) * FOLDS as f64) as usize == f).collect();
+    let fold =
+        |f: usize| inner.iter().copied().filter(|k| (golden(*k) * FOLDS as f64) as usize == f).collect();
     (0..FOLDS).map(fold).filter(|fold: &Vec<usize>| !fold.is_empty()).collect()
 }
 
@@ -305,7 +316,11 @@ impl<'a> Subset<'a> {
     /// Levels of an axis, with others between them where there are few axes.
     fn nodes(&self, axis: usize) -> Vec<f64> {
         let levels = &self.data.levels[axis];
-        let parts = if self.axes.len() <= 2 && levels.len() > 1 { NODES.div_ceil(levels.len() - 1).max(1) } else { 1 };
+        let parts = if self.axes.len() <= 2 && levels.len() > 1 {
+            NODES.div_ceil(levels.len() - 1).max(1)
+        } else {
+            1
+        };
         let between = |w: &[f64]| -> Vec<f64> {
             (0..parts).map(|p| w[0] + (w[1] - w[0]) * p as f64 / parts as f64).collect()
         };

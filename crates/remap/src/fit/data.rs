@@ -54,7 +54,8 @@ impl Data {
             Ok(Input { name: axis.name.clone(), min, max, logarithmic })
         };
         let inputs = probe.source_axes.iter().map(input).collect::<Result<Vec<Input>, _>>()?;
-        let places_of = |(axis, input): (&Axis, &Input)| axis.levels.iter().map(|v| input.normalised(*v)).collect();
+        let places_of =
+            |(axis, input): (&Axis, &Input)| axis.levels.iter().map(|v| input.normalised(*v)).collect();
         let axis = &probe.target_axes[k];
         let is_logarithmic = is_logarithmic(&probe.to, axis)?;
         let mut data = Self {
@@ -110,7 +111,10 @@ fn weight(probe: &Probe, entry: &Entry, roles: &[Role], k: usize) -> f64 {
 
 /// True where the specular lobe of a target is black.
 fn is_lobe_off(target: &[f64], roles: &[Role]) -> bool {
-    target.iter().zip(roles).any(|(v, role)| *v == 0.0 && role.is_reflectance() && *role != Role::RefractiveIndex)
+    target
+        .iter()
+        .zip(roles)
+        .any(|(v, role)| *v == 0.0 && role.is_reflectance() && *role != Role::RefractiveIndex)
 }
 
 /// True where noise hides whether the target is the best.

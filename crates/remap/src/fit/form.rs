@@ -118,7 +118,8 @@ impl Function {
         let n = self.inputs.len();
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         let ascending = |v: &[f64]| !v.is_empty() && finite(v) && v.windows(2).all(|w| w[0] < w[1]);
-        let range = |min: f64, max: f64, is_log: bool| min <= max && (!is_log || min > 0.0) && max.is_finite();
+        let range =
+            |min: f64, max: f64, is_log: bool| min <= max && (!is_log || min > 0.0) && max.is_finite();
         let is_shaped = match &self.shape {
             Shape::Polynomial { terms, .. } => {
                 terms.iter().all(|t| t.powers.len() == n && t.coefficient.is_finite())
@@ -129,7 +130,10 @@ impl Function {
             }
             Shape::Grid { nodes, values } => {
                 let count: usize = nodes.iter().map(Vec::len).product();
-                nodes.len() == n && count == values.len() && nodes.iter().all(|v| ascending(v)) && finite(values)
+                nodes.len() == n
+                    && count == values.len()
+                    && nodes.iter().all(|v| ascending(v))
+                    && finite(values)
             }
         };
         let is_ranged = self.inputs.iter().all(|i| range(i.min, i.max, i.logarithmic))
@@ -142,7 +146,9 @@ impl Shape {
     /// The value at a place in `u`.
     pub(crate) fn evaluate(&self, u: &[f64]) -> f64 {
         match self {
-            Self::Polynomial { terms, .. } => terms.iter().map(|t| t.coefficient * monomial(&t.powers, u)).sum(),
+            Self::Polynomial { terms, .. } => {
+                terms.iter().map(|t| t.coefficient * monomial(&t.powers, u)).sum()
+            }
             Self::Spline { knots, values, slopes } => hermite(knots, values, slopes, u[0]),
             Self::Grid { nodes, values } => multilinear(nodes, values, u),
         }

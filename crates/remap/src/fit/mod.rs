@@ -147,7 +147,10 @@ impl Fit {
             let has_form = parameter.form == FitForm::Table || parameter.function().is_some();
             let is_placed = |places: &[usize]| places.iter().all(|p| *p < probe.entries.len());
             if !has_form || !is_placed(&parameter.light) || !is_placed(&parameter.outside) {
-                return Err(format!("fit of {}: it lacks its form, or speaks of entries that are not there", parameter.name));
+                return Err(format!(
+                    "fit of {}: it lacks its form, or speaks of entries that are not there",
+                    parameter.name
+                ));
             }
         }
         Ok(())

@@ -178,7 +178,7 @@ pub(crate) fn pchip_slopes(knots: &[f64], values: &[f64]) -> Vec<f64> {
 pub(crate) fn make_monotone(values: &mut [f64], shape: &[usize], axis: usize, sign: f64) {
     let stride: usize = shape[axis + 1..].iter().product();
     let length = shape[axis];
-    for start in (0..values.len()).filter(|k| k / stride % length == 0) {
+    for start in (0..values.len()).filter(|k| (k / stride).is_multiple_of(length)) {
         let line: Vec<f64> = (0..length).map(|i| sign * values[start + i * stride]).collect();
         let mut above = line.clone();
         (1..length).for_each(|i| above[i] = above[i].max(above[i - 1]));
@@ -221,7 +221,9 @@ mod tests {
     #[test]
     fn replicates_of_few_places_are_averaged() {
         let mut samples = Samples::default();
-        for (u, y) in [-1.0, -1.0 + 1e-16, 0.0, 1e-16, 1.0, 1.0].into_iter().zip([0.0, 0.2, 1.0, 1.2, 2.0, 2.2]) {
+        for (u, y) in
+            [-1.0, -1.0 + 1e-16, 0.0, 1e-16, 1.0, 1.0].into_iter().zip([0.0, 0.2, 1.0, 1.2, 2.0, 2.2])
+        {
             samples.u.push(vec![u]);
             samples.y.push(y);
             samples.w.push(1.0);
@@ -239,7 +241,9 @@ mod tests {
         let samples = grid(7, |a, b| 0.1 - 0.2 * a + 0.3 * b * b * b - 0.4 * a * a * b);
         let powers = powers(2, 3, &[6, 6]);
         assert_eq!(powers.len(), 10);
-        let Shape::Polynomial { terms, .. } = polynomial(&samples, &powers, 3) else { panic!("no polynomial") };
+        let Shape::Polynomial { terms, .. } = polynomial(&samples, &powers, 3) else {
+            panic!("no polynomial")
+        };
         for term in terms {
             let truth = match term.powers[..] {
                 [0, 0] => 0.1,
@@ -256,7 +260,8 @@ mod tests {
     fn monotone_splines_do_not_overshoot() {
         // Fritsch and Carlson's RPN 14 data, made for this.
         let knots = [7.99, 8.09, 8.19, 8.7, 9.2, 10.0, 12.0, 15.0, 20.0];
-        let values = [0.0, 2.76429e-5, 4.37498e-2, 0.169183, 0.469428, 0.943740, 0.998636, 0.999919, 0.999994];
+        let values =
+            [0.0, 2.76429e-5, 4.37498e-2, 0.169183, 0.469428, 0.943740, 0.998636, 0.999919, 0.999994];
         let slopes = pchip_slopes(&knots, &values);
         let shape = Shape::Spline { knots: knots.to_vec(), values: values.to_vec(), slopes };
         let mut last = -1e-15;

@@ -2,8 +2,8 @@
 
 use lookmatch_imaging::nrmsd;
 use lookmatch_materials::Material;
-use lookmatch_rendering::{Part, TransportCache};
 use lookmatch_rendering::Observe;
+use lookmatch_rendering::{Part, TransportCache};
 use serde::{Deserialize, Serialize};
 
 use super::{Fit, FitForm};
@@ -80,7 +80,8 @@ impl Sample<'_> {
     /// The target with some values replaced.
     fn target(&self, replaced: &[Option<f64>]) -> Result<Material, RemapError> {
         let entry = &self.probe.entries[self.place];
-        let values: Vec<f64> = entry.target.iter().zip(replaced).map(|(own, new)| new.unwrap_or(*own)).collect();
+        let values: Vec<f64> =
+            entry.target.iter().zip(replaced).map(|(own, new)| new.unwrap_or(*own)).collect();
         self.probe.target_material(&self.source, &values, entry.body)
     }
 }
@@ -101,7 +102,9 @@ impl Fit {
         let places = validation_points(probe, Some(count));
         let samples = places.into_iter().filter(|place| probe.entries[*place].failed.is_none());
         let samples = samples
-            .map(|place| Ok(Sample { probe, place, source: probe.source_material(&probe.entries[place].source)? }))
+            .map(|place| {
+                Ok(Sample { probe, place, source: probe.source_material(&probe.entries[place].source)? })
+            })
             .collect::<Result<Vec<_>, RemapError>>()?;
         let n = self.parameters.len();
         if samples.is_empty() {
@@ -181,7 +184,12 @@ impl Fit {
 }
 
 /// Mean NRMSD of the channels between a source and each of some targets.
-fn errors(stage: &Stage, probe: &Probe, source: &Material, targets: &[Material]) -> Result<Vec<f64>, RemapError> {
+fn errors(
+    stage: &Stage,
+    probe: &Probe,
+    source: &Material,
+    targets: &[Material],
+) -> Result<Vec<f64>, RemapError> {
     let view = stage.views()[1];
     let materials: Vec<&Material> = std::iter::once(source).chain(targets).collect();
     let images = view.render_batch(&materials, Part::Full);

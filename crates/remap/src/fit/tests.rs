@@ -4,9 +4,7 @@ use lookmatch_materials::{Material, Role, by_name};
 use lookmatch_search::Axis;
 
 use super::{Fit, FitForm, Function, Shape};
-use crate::{
-    Entry, Flag, Options, Plan, Probe, RemapError, Strategy, apply, apply_table, compose, invert,
-};
+use crate::{Entry, Flag, Options, Plan, Probe, RemapError, Strategy, apply, apply_table, compose, invert};
 
 /// A probe whose target values are functions of its source's specular reflectance and roughness, rounded to the lattice.
 fn probe(from: &str, to: &str, strategy: Strategy, truth: &dyn Fn(f64, f64) -> Vec<f64>) -> Probe {
@@ -32,9 +30,13 @@ fn ward_to_as(truth: &dyn Fn(f64, f64) -> Vec<f64>) -> Probe {
     probe("ward", "as", Strategy::Constrained, truth)
 }
 
-/// Numbers between −1 and 1 without a pattern, the same every time.
+/// Numbers between −1 and 1 without a pattern, the same every time (the finaliser of SplitMix64).
 fn noise(s: f64, r: f64) -> f64 {
-    ((s * 1234.5 + r * 987.6).sin() * 43758.5453).fract()
+    let seed = (s * 1e4).round() as u64 * 1_000_003 + (r * 1e4).round() as u64;
+    let z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
 fn function<'a>(fit: &'a Fit, name: &str) -> &'a Function {
@@ -52,7 +54,10 @@ fn known_functions_come_back_with_what_they_depend_on() {
     for (parameter, degree) in [(specular, 2), (roughness, 1)] {
         assert_eq!(parameter.form, FitForm::Closed, "{}", parameter.why);
         let candidate = parameter.closed.as_ref().unwrap();
-        assert!(matches!(candidate.function.shape, Shape::Polynomial { degree: d, .. } if d == degree), "{candidate:?}");
+        assert!(
+            matches!(candidate.function.shape, Shape::Polynomial { degree: d, .. } if d == degree),
+            "{candidate:?}"
+        );
         assert!(candidate.residual.steps < 0.4 && candidate.residual.rms > 0.0, "{:?}", candidate.residual);
         let local = parameter.local.as_ref().unwrap();
         assert!(local.residual.steps < 0.4, "{:?}", local.residual);
@@ -148,7 +153,8 @@ fn probes_keep_their_fit_and_do_without() {
     probe.fit = Some(Fit::new(&probe).unwrap());
     probe.write(&path).unwrap();
     assert_eq!(Probe::read(&path).unwrap(), probe);
-    probe.fit.as_mut().unwrap().parameters[0].closed.as_mut().unwrap().function.inputs[0].name = "gloss".into();
+    probe.fit.as_mut().unwrap().parameters[0].closed.as_mut().unwrap().function.inputs[0].name =
+        "gloss".into();
     probe.write(&path).unwrap();
     let error = Probe::read(&path).unwrap_err().to_string();
     assert!(error.contains("'gloss'") && error.contains("specular"), "{error}");
@@ -161,7 +167,10 @@ fn the_inverse_of_a_bijection_leads_back() {
     let back = invert(&there).unwrap();
     assert_eq!((back.from.model().name, back.to.model().name), ("as", "ward"));
     let [specular, roughness] = &back.source_axes[..] else { panic!("two axes") };
-    assert!((roughness.value(0) - 0.059).abs() < 3e-3 && (roughness.value(roughness.len() - 1) - 0.671).abs() < 3e-3);
+    assert!(
+        (roughness.value(0) - 0.059).abs() < 3e-3
+            && (roughness.value(roughness.len() - 1) - 0.671).abs() < 3e-3
+    );
     assert!(specular.value(specular.len() - 1) < 0.53);
     for trip in &back.derived.as_ref().unwrap().round_trip {
         assert!(trip.entries == 700 && trip.mean < 1e-3 && trip.max < 1e-2, "{trip:?}");
@@ -177,7 +186,7 @@ fn the_inverse_of_a_bijection_leads_back() {
     let unreachable = &back.derived.as_ref().unwrap().unreachable;
     let (middle, corner) = (back.source_axes[1].len() * 11 / 2, back.entries.len() - 1);
     assert!(unreachable.contains(&corner) && !unreachable.contains(&middle), "{unreachable:?}");
-    assert_eq!(back.entries[corner].saturated.len(), 2);
+    assert_eq!(back.entries[corner].saturated, ["specular"]);
     let far = Material::parse("as:specular=0.9,roughness=0.3").unwrap();
     assert!(matches!(apply(&back, &far, false), Err(RemapError::OutsideProbe { .. })));
     assert_eq!(apply(&back, &far, true).unwrap().clamped, ["specular"]);
@@ -229,7 +238,10 @@ fn a_composition_takes_what_its_second_probe_can() {
     assert_eq!(clamped.source_axes, first.source_axes);
     assert!(clamped.entries[699].saturated.contains(&"specular of as".to_owned()));
     let error = compose(&second, &second, false).unwrap_err();
-    assert!(error.is_usage() && error.to_string().contains("leads to ward, the second one starts from as"), "{error}");
+    assert!(
+        error.is_usage() && error.to_string().contains("leads to ward, the second one starts from as"),
+        "{error}"
+    );
     let other = second.from.clone();
     second.from.set("eta", "1.1").unwrap();
     assert_ne!(other, second.from);
