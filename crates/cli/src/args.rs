@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bytesize::ByteSize;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lookmatch_materials::Levels;
 use lookmatch_remap::{Assignment, Side, Vary};
@@ -46,6 +47,8 @@ pub(crate) enum Command {
     Validate(ValidateArgs),
     /// Measure speed and accuracy on this machine, alone or beside another renderer
     Bench(BenchArgs),
+    /// List, verify or shrink the database of other renderers' pictures
+    Cache(CacheArgs),
     /// Write a scene for another renderer
     Scene(SceneArgs),
     /// Find mistakes in a material's numbers: gloss for roughness, sRGB for linear, F0 for an index, ...
@@ -482,6 +485,38 @@ fn assignment(text: &str) -> Result<Assignment, String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     let (side, name) = side(name.trim());
     Ok(Assignment { side, name, value: value.trim().to_owned() })
+}
+
+#[derive(Args)]
+pub(crate) struct CacheArgs {
+    #[command(subcommand)]
+    pub(crate) command: CacheCommand,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum CacheCommand {
+    /// Say what is kept, by renderer and scene
+    List {
+        #[command(flatten)]
+        json: Json,
+    },
+    /// Check every picture; damaged ones are removed, and rendered again when they are needed
+    Verify {
+        #[command(flatten)]
+        json: Json,
+    },
+    /// Remove the pictures that were not used for longest
+    Gc {
+        /// Bytes that the database may have: 500MB, 2GiB
+        #[arg(long, value_name = "SIZE", value_parser = byte_size)]
+        max_size: ByteSize,
+        #[command(flatten)]
+        json: Json,
+    },
+}
+
+fn byte_size(text: &str) -> Result<ByteSize, String> {
+    text.parse().map_err(|_| "expected bytes with or without a unit: 500MB, 1.5GiB, 1000000".to_owned())
 }
 
 #[derive(Args)]

@@ -57,6 +57,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Validate(args) => commands::validate::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
         Command::Scene(args) => commands::scene::run(&args),
+        Command::Cache(args) => commands::cache::run(&args),
         Command::Lint(args) => commands::lint::run(&args),
         Command::Match(args) => commands::match_pictures::run(&args),
     }

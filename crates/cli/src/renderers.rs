@@ -7,15 +7,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::Context;
+use lookmatch_database::{Database, KeptPool, Shown};
 use lookmatch_imaging::Image;
 use lookmatch_materials::{Description, Material, Model, by_name, split_name};
 use lookmatch_remap::{RendererRecord, Shot, Studio};
-use lookmatch_renderers::{Bundled, Hello, Installations, Job, Launch, Pool, PoolOptions, Stop};
+use lookmatch_renderers::{
+    Bundled, Hello, Installations, Job, Launch, Pool, PoolOptions, RendererError, Stop,
+};
 use lookmatch_rendering::{Illumination, Scene};
 
 use crate::Usage;
 use crate::args::RendererArgs;
 use crate::output::spinner;
+use crate::transport::renders;
 
 /// A flag that Ctrl-C raises. Asked for once, by commands that end their work in order.
 pub(crate) fn interruption() -> anyhow::Result<Arc<AtomicBool>> {
@@ -98,7 +102,7 @@ pub(crate) struct Renderers {
 /// One of them.
 struct Hired {
     name: String,
-    pool: Pool,
+    pool: KeptPool,
     models: Vec<Description>,
 }
 
@@ -110,6 +114,7 @@ impl Renderers {
         stopped: &Arc<AtomicBool>,
     ) -> anyhow::Result<Self> {
         let mut list: Vec<Arc<Hired>> = Vec::new();
+        let database = if names.is_empty() { None } else { database() };
         for name in names {
             if list.iter().any(|hired| hired.name == *name) {
                 continue;
@@ -124,7 +129,8 @@ impl Renderers {
                 log: args.log.clone(),
                 ..PoolOptions::default()
             };
-            let hired = Hired::start(name, Pool::start(launch, options, stop)?)?;
+            let pool = Pool::start(launch.clone(), options, stop)?;
+            let hired = Hired::start(name, KeptPool::new(pool, &launch, database.clone()))?;
             progress.finish_and_clear();
             list.push(Arc::new(hired));
         }
@@ -161,21 +167,21 @@ impl Renderers {
         self.list.iter().map(|hired| hired.pool.hello())
     }
 
-    /// Pictures of materials of one of them, each with its own seed.
+    /// Pictures of materials of one of them, each with its own seed; found, or rendered now.
     pub(crate) fn pictures(
         &self,
         (scene, light, size): (&Scene, Illumination, usize),
         samples: u32,
         materials: &[(&Material, u32)],
-    ) -> anyhow::Result<Vec<Image>> {
+    ) -> anyhow::Result<Vec<Shown>> {
         let hired = self.of(materials[0].0)?;
         hired.set_scene("picture", scene, light, size).map_err(anyhow::Error::msg)?;
         let shots =
             materials.iter().map(|&(material, seed)| Shot { scene: "picture", material, samples, seed });
         let progress = spinner(&format!("rendering with {}", hired.name));
-        let images = hired.render(&shots.collect::<Vec<_>>());
+        let shown = hired.shown(&shots.collect::<Vec<_>>());
         progress.finish_and_clear();
-        images.into_iter().collect::<Result<_, _>>().map_err(anyhow::Error::msg)
+        Ok(shown.into_iter().collect::<Result<_, _>>()?)
     }
 
     /// Whether pictures of a material of theirs have noise.
@@ -196,7 +202,7 @@ impl Renderers {
 }
 
 impl Hired {
-    fn start(name: &str, pool: Pool) -> anyhow::Result<Self> {
+    fn start(name: &str, pool: KeptPool) -> anyhow::Result<Self> {
         let read = |model: &serde_json::Value| {
             let description: Description = serde_json::from_value(model.clone()).with_context(|| {
                 format!("{name} describes a model in a way that is not understood: {model}")
@@ -206,6 +212,23 @@ impl Hired {
         };
         let models = pool.hello().models.iter().map(read).collect::<anyhow::Result<_>>()?;
         Ok(Self { name: name.to_owned(), pool, models })
+    }
+
+    /// Pictures, found or rendered.
+    fn shown(&self, shots: &[Shot]) -> Vec<Result<Shown, RendererError>> {
+        let job = |shot: &Shot| {
+            let mut values = shot.material.to_json().as_object().cloned().unwrap_or_default();
+            values.remove("model");
+            let model = shot.material.model().name;
+            Job {
+                scene: shot.scene.to_owned(),
+                model: model.split_once(':').map_or(model, |(_, model)| model).to_owned(),
+                values,
+                samples: shot.samples,
+                seed: shot.seed,
+            }
+        };
+        self.pool.render(&shots.iter().map(job).collect::<Vec<_>>())
     }
 }
 
@@ -223,20 +246,24 @@ impl Studio for Hired {
     }
 
     fn render(&self, shots: &[Shot]) -> Vec<Result<Image, String>> {
-        let job = |shot: &Shot| {
-            let mut values = shot.material.to_json().as_object().cloned().unwrap_or_default();
-            values.remove("model");
-            let model = shot.material.model().name;
-            Job {
-                scene: shot.scene.to_owned(),
-                model: model.split_once(':').map_or(model, |(_, model)| model).to_owned(),
-                values,
-                samples: shot.samples,
-                seed: shot.seed,
-            }
-        };
-        let jobs: Vec<Job> = shots.iter().map(job).collect();
-        let pictures = self.pool.render(&jobs).into_iter();
-        pictures.map(|picture| picture.map(|p| p.image).map_err(|e| e.to_string())).collect()
+        self.take(shots).into_iter().map(|result| result.map(|(image, _)| image)).collect()
+    }
+
+    fn take(&self, shots: &[Shot]) -> Vec<Result<(Image, bool), String>> {
+        let image = |shown: Shown| (shown.picture.image, shown.is_found);
+        self.shown(shots).into_iter().map(|shown| shown.map(image).map_err(|e| e.to_string())).collect()
+    }
+}
+
+/// The render database, unless it is turned off or cannot be used.
+fn database() -> Option<Arc<Database>> {
+    let path = renders()?;
+    let warn = |text: &str| eprintln!("warning: {text}");
+    match Database::open(&path, Arc::new(warn)) {
+        Ok(database) => Some(Arc::new(database)),
+        Err(error) => {
+            warn(&format!("pictures are not kept: {error}"));
+            None
+        }
     }
 }

@@ -1,6 +1,7 @@
-//! Where prepared light is kept between runs, and what is said while it is prepared.
+//! Where prepared light and other renderers' pictures are kept between runs, and what is said while light is prepared.
 
 use std::env;
+use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -22,6 +23,16 @@ pub(crate) fn cache() -> TransportCache {
             TransportCache::new(folders.cache_dir().join("transport"))
         }),
     }
+}
+
+/// The render database in the same place: in the folder that the user names, or beside that of prepared light.
+pub(crate) fn renders() -> Option<PathBuf> {
+    let folder = match env::var_os(VARIABLE) {
+        Some(value) if value == "off" => return None,
+        Some(folder) if !folder.is_empty() => PathBuf::from(folder),
+        _ => ProjectDirs::from("", "", "lookmatch")?.cache_dir().to_owned(),
+    };
+    Some(folder.join("renders.sqlite"))
 }
 
 /// Shows the preparation of a scene, and nothing where it is kept from before.

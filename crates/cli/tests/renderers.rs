@@ -31,8 +31,9 @@ fn program(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookmatch"));
     let installed = std::env::var_os("LOOKMATCH_RENDERERS")
         .unwrap_or_else(|| concat!(env!("CARGO_TARGET_TMPDIR"), "/renderers").into());
-    let light = concat!(env!("CARGO_TARGET_TMPDIR"), "/transport");
-    command.current_dir(folder).env("LOOKMATCH_RENDERERS", installed).env("LOOKMATCH_CACHE", light);
+    // Pictures of an earlier run would be found there, and nothing be rendered.
+    let kept = folder.join("kept");
+    command.current_dir(folder).env("LOOKMATCH_RENDERERS", installed).env("LOOKMATCH_CACHE", kept);
     command
 }
 
@@ -107,7 +108,7 @@ fn radiances_plastic_is_wards() {
     install("radiance");
     let folder = TempDir::new().unwrap();
     let remap = "remap ward:variant=gmd,specular=0.1,diffuse=0.3 radiance:plastic:specularity=0.1 \
-         --vary source.roughness=0.1:0.3:0.1 --vary target.roughness=0.02:0.5:0.01 --max-samples 256";
+         --vary source.roughness=0.1:0.3:0.2 --vary target.roughness=0.02:0.5:0.01 --max-samples 64";
     comes_back(&entries(folder.path(), remap), |alpha| alpha);
 }
 
@@ -121,12 +122,12 @@ fn microfacets_travel_between_mitsuba_and_cycles() {
             format!("mitsuba:roughconductor:distribution={theirs},eta=0,k=1,specular_reflectance=1");
         let cycles = format!("cycles:glossy:distribution={ours},color=1");
         let there = format!(
-            "remap {mitsuba} {cycles} --vary source.alpha=0.1:0.4:0.15 --vary target.roughness=0.1:0.85:0.01 \
+            "remap {mitsuba} {cycles} --vary source.alpha=0.1:0.4:0.3 --vary target.roughness=0.1:0.85:0.01 \
              --max-samples 256"
         );
         comes_back(&entries(folder.path(), &there), f64::sqrt);
         let back = format!(
-            "remap {cycles} {mitsuba} --vary source.roughness=0.3:0.7:0.2 --vary target.alpha=0.02:0.7:0.01 \
+            "remap {cycles} {mitsuba} --vary source.roughness=0.3:0.7:0.4 --vary target.alpha=0.02:0.7:0.01 \
              --max-samples 256"
         );
         comes_back(&entries(folder.path(), &back), |roughness| roughness * roughness);

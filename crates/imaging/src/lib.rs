@@ -19,7 +19,7 @@ pub use atomic::write_atomically;
 pub use colour::{delta_e76, lab_from_linear_srgb, luminance, srgb_decode, srgb_encode};
 pub use error::ImageError;
 pub use false_colour::{error_map, error_scale};
-pub use file::{MAX_PIXELS, decode, read, write};
+pub use file::{MAX_PIXELS, decode, encode, read, write};
 pub use image::Image;
 pub use lab::{lab_planes, lab_planes_of, squared_distance, weighted_squared_distance};
 pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};

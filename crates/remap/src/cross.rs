@@ -437,7 +437,8 @@ impl CrossStage {
         let most = self.sampling.most;
         let source = plan.source_material(values)?;
         // It takes part in every comparison, so that no number of candidates averages its noise out; and is rendered but once.
-        let seen = self.look(&source, true, SOURCE * most)?;
+        let is_noisy = self.archive(&source).is_some_and(|archive| archive.studio.has_noise());
+        let seen = self.look(&source, true, if is_noisy { SOURCE * most } else { most })?;
         let level = seen.level();
         let rounded = self.carried(&source, level)?.rounded_albedo();
         let with_diffuse = plan.to.model().renderer.is_none();

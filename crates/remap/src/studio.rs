@@ -29,6 +29,11 @@ pub trait Studio: Send + Sync {
 
     /// Pictures in the order of the shots; a failed one says why, and does not hold up the others.
     fn render(&self, shots: &[Shot]) -> Vec<Result<Image, String>>;
+
+    /// [`Studio::render`], and true with pictures that were found: some studios keep what they rendered.
+    fn take(&self, shots: &[Shot]) -> Vec<Result<(Image, bool), String>> {
+        self.render(shots).into_iter().map(|result| result.map(|image| (image, false))).collect()
+    }
 }
 
 /// One picture.
@@ -115,9 +120,11 @@ pub(crate) struct Archive {
 /// What pictures have cost so far.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Counts {
-    /// Renders that were asked for.
+    /// Renders that were made.
     pub renders: usize,
-    /// Of them, those that failed.
+    /// Pictures that were found instead, from an earlier run.
+    pub found: usize,
+    /// Of the renders, those that failed.
     pub failed: usize,
     /// Time spent waiting for them.
     #[serde(skip)]
@@ -192,16 +199,18 @@ impl Archive {
             return;
         }
         let begin = Instant::now();
-        let mut images = self.studio.render(&shots).into_iter();
+        let mut images = self.studio.take(&shots).into_iter();
         let waited = begin.elapsed();
         let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
         counts.waited += waited;
         for (task, batches) in tasks.into_iter().zip(batches) {
-            let images: Vec<Result<Image, String>> =
+            let images: Vec<Result<(Image, bool), String>> =
                 images.by_ref().take(halves as usize * batches.len()).collect();
-            counts.renders += images.len();
+            let found = images.iter().filter(|image| matches!(image, Ok((_, true)))).count();
+            counts.found += found;
+            counts.renders += images.len() - found;
             counts.failed += images.iter().filter(|image| image.is_err()).count();
-            match images.into_iter().collect::<Result<Vec<Image>, String>>() {
+            match images.into_iter().map(|image| Ok(image?.0)).collect::<Result<Vec<Image>, String>>() {
                 Ok(images) => {
                     self.known().put(task.identity.clone(), Arc::new(task.joined(&batches, images)));
                 }

@@ -177,6 +177,14 @@ impl Pool {
         Ok(())
     }
 
+    /// What workers are told of a scene, but for its name: the message, a JSON object, and the bytes of its map.
+    pub fn told(&self, scene: &str) -> Option<(Value, Arc<[u8]>)> {
+        let data = lock(&self.scenes).get(scene).cloned()?;
+        let mut message = data.message.clone();
+        message.remove("scene");
+        Some((message.into(), data.data.clone()))
+    }
+
     /// Renders pictures, the results in the order of the jobs. One that fails is repeated on a fresh worker, and only then
     /// an error, which no other job suffers from; unless too many fail in a row.
     pub fn render(&self, jobs: &[Job]) -> Vec<Result<Picture, RendererError>> {

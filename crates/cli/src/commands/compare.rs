@@ -112,13 +112,12 @@ impl Views<'_> {
     fn elsewhere(&self, material: &Material, seed: u32) -> anyhow::Result<View> {
         let place = (self.scene, self.illumination, self.args.size);
         if !self.renderers.has_noise(material)? {
-            let image =
-                self.renderers.pictures(place, self.args.samples, &[(material, seed)])?.swap_remove(0);
-            return Ok(View { image, noise: None });
+            let mut shown = self.renderers.pictures(place, self.args.samples, &[(material, seed)])?;
+            return Ok(View { image: shown.swap_remove(0).picture.image, noise: None });
         }
         let halves = [(material, seed), (material, seed + 1)];
         let mut halves = self.renderers.pictures(place, self.args.samples.div_ceil(2), &halves)?;
-        let (mut noise, mut image) = (halves.swap_remove(1), halves.swap_remove(0));
+        let [mut noise, mut image] = [1, 0].map(|half| halves.swap_remove(half).picture.image);
         for (a, b) in image.pixels_mut().iter_mut().zip(noise.pixels_mut()) {
             for (a, b) in a.iter_mut().zip(b) {
                 (*a, *b) = ((*a + *b) / 2.0, (*a - *b) / 2.0);

@@ -73,7 +73,7 @@ pub(crate) fn run(args: &MatchArgs) -> anyhow::Result<()> {
     let renderings: Vec<Json> = stage
         .counts()
         .into_iter()
-        .map(|(name, counts)| json!({"name": name, "renders": counts.renders, "failed": counts.failed}))
+        .map(|(name, counts)| json!({"name": name, "renders": counts.renders, "found": counts.found, "failed": counts.failed}))
         .collect();
     let parameters: BTreeMap<&str, f64> =
         plan.target_axes.iter().map(|axis| axis.name.as_str()).zip(found.values.iter().copied()).collect();

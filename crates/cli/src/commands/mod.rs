@@ -2,6 +2,7 @@
 
 pub(crate) mod apply;
 pub(crate) mod bench;
+pub(crate) mod cache;
 pub(crate) mod compare;
 pub(crate) mod compose;
 pub(crate) mod cross;

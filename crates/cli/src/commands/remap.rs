@@ -89,7 +89,10 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
 struct Cost {
     name: String,
     version: String,
+    /// Renders that were made.
     renders: usize,
+    /// Pictures that an earlier run had rendered.
+    found: usize,
     failed: usize,
     /// Time that was spent waiting for it.
     renderer_s: f64,
@@ -102,7 +105,7 @@ struct Cost {
 
 impl Cost {
     fn text(&self) -> String {
-        let Self { name, version, renders, renderer_s, cpu_s, .. } = self;
+        let Self { name, version, renders, found, renderer_s, cpu_s, .. } = self;
         let failed = match self.failed {
             0 => String::new(),
             failed => format!(", {failed} of them failed ({})", self.reasons.join("; ")),
@@ -110,7 +113,7 @@ impl Cost {
         let restarts =
             if self.restarts > 0 { format!(", {} restarts", self.restarts) } else { String::new() };
         format!(
-            "{name} {version}: {renders} renders{failed}{restarts}, {renderer_s:.1} s waited for it ({cpu_s:.1} CPU s)"
+            "{name} {version}: {renders} renders{failed}{restarts}, {found} found from earlier, {renderer_s:.1} s waited for it ({cpu_s:.1} CPU s)"
         )
     }
 }
@@ -148,6 +151,7 @@ fn search_across(
             version: version.map(|record| record.version.clone()).unwrap_or_default(),
             name,
             renders: counts.renders,
+            found: counts.found,
             failed: counts.failed,
             renderer_s: counts.waited.as_secs_f64(),
             own_s: all - waited,

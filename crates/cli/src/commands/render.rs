@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use lookmatch_database::Shown;
 use lookmatch_imaging::{Image, write};
 use lookmatch_materials::{BlackBody, Material};
 use lookmatch_rendering::{Part, RENDERERS, RendererEntry};
@@ -74,10 +75,14 @@ fn run_elsewhere(args: &RenderArgs, name: String) -> anyhow::Result<()> {
         let shots: Vec<_> = materials.iter().map(|material| (*material, seed)).collect();
         renderers.pictures((&scene, illumination, args.size), args.samples, &shots)
     };
-    let image = match args.diffuse_only {
+    let (image, shown) = match args.diffuse_only {
         true => body_alone(&material, take)?,
-        false => take(&[&material])?.swap_remove(0),
+        false => {
+            let shown = take(&[&material])?;
+            (shown[0].picture.image.clone(), shown)
+        }
     };
+    let is_found = shown.iter().all(|shown| shown.is_found);
     let (name, usage) = renderers.usage().swap_remove(0);
     let version = renderers.records(&[]).swap_remove(0).version;
     let notes = [
@@ -86,14 +91,15 @@ fn run_elsewhere(args: &RenderArgs, name: String) -> anyhow::Result<()> {
     ];
     write(&args.output, &image, &notes)?;
     let seconds = started.elapsed().as_secs_f64();
-    eprintln!("{} in {seconds:.1} s by {name} {version}", args.output.display());
+    let how = if is_found { ", rendered earlier" } else { "" };
+    eprintln!("{} in {seconds:.1} s by {name} {version}{how}", args.output.display());
     if args.json.json {
         let summary = json!({
             "output": args.output, "scene": scene.name, "light": args.light, "size": args.size,
             "part": if args.diffuse_only { "diffuse" } else { "full" }, "material": material,
             "renderer": name, "version": version, "seed": seed, "seconds": seconds, "cpu_s": usage.cpu_s,
             // As many as it took: some round.
-            "samples": usage.pixel_samples / usage.pictures.max(1) / (args.size * args.size) as u64,
+            "samples": shown[0].picture.samples, "is_found": is_found,
         });
         return print_json(&summary);
     }
@@ -103,17 +109,17 @@ fn run_elsewhere(args: &RenderArgs, name: String) -> anyhow::Result<()> {
 /// What a black body takes away, under the same noise.
 fn body_alone(
     material: &Material,
-    take: impl FnOnce(&[&Material]) -> anyhow::Result<Vec<Image>>,
-) -> anyhow::Result<Image> {
+    take: impl FnOnce(&[&Material]) -> anyhow::Result<Vec<Shown>>,
+) -> anyhow::Result<(Image, Vec<Shown>)> {
     let BlackBody { coloured, black, share } = material.blackened().ok_or_else(|| {
         Usage(format!("{material} has no diffuse reflection that --diffuse-only could show"))
     })?;
-    let mut images = take(&[&coloured, &black])?;
-    let (black, mut image) = (images.swap_remove(1), images.swap_remove(0));
+    let shown = take(&[&coloured, &black])?;
+    let (black, mut image) = (&shown[1].picture.image, shown[0].picture.image.clone());
     for (pixel, black) in image.pixels_mut().iter_mut().zip(black.pixels()) {
         (0..3).for_each(|c| pixel[c] = share as f32 * (pixel[c] - black[c]));
     }
-    Ok(image)
+    Ok((image, shown))
 }
 
 fn renderer(name: &str) -> anyhow::Result<&'static RendererEntry> {

@@ -60,6 +60,19 @@ fn decoder(path: &Path) -> Result<Decoder, ImageError> {
 /// Another extension (refused before anything is written), an image without pixels or with NaN or infinite values,
 /// a note that the format cannot hold, and what the operating system refuses; the message names the file.
 pub fn write(path: &Path, image: &Image, notes: &[(String, String)]) -> Result<(), ImageError> {
+    let bytes = encode(path, image, notes)?;
+    write_atomically(path, |out| out.write_all(&bytes)).map_err(|source| ImageError::Io {
+        path: path.into(),
+        action: "write",
+        source,
+    })
+}
+
+/// The content of the file that [`write`] would write; `path` gives its format and its name in messages.
+///
+/// # Errors
+/// As [`write`], but for what the operating system refuses.
+pub fn encode(path: &Path, image: &Image, notes: &[(String, String)]) -> Result<Vec<u8>, ImageError> {
     let encode = match extension(path).as_deref() {
         Some("exr") => exr::encode,
         Some("png") => png::encode,
@@ -67,12 +80,7 @@ pub fn write(path: &Path, image: &Image, notes: &[(String, String)]) -> Result<(
     };
     check_dimensions(path, image.width(), image.height(), usize::MAX)?;
     check_finite(path, image)?;
-    let bytes = encode(path, image, notes)?;
-    write_atomically(path, |out| out.write_all(&bytes)).map_err(|source| ImageError::Io {
-        path: path.into(),
-        action: "write",
-        source,
-    })
+    encode(path, image, notes)
 }
 
 /// The extension in lower case.
