@@ -33,8 +33,14 @@ pub(crate) enum Command {
     Cross(CrossArgs),
     /// Map one material through a probe
     Apply(ApplyArgs),
-    /// Say what is in a probe
+    /// Say what is in a probe, or draw it
     Inspect(InspectArgs),
+    /// Turn a probe's table into smooth functions, and say what they leave
+    Fit(FitArgs),
+    /// Turn a probe round: from its target to its source
+    Invert(InvertArgs),
+    /// Make one probe of two: A to B, then B to C
+    Compose(ComposeArgs),
     /// Render two materials side by side and measure their difference
     Compare(CompareArgs),
     /// Judge a probe in a scene that its search never saw
@@ -308,6 +314,12 @@ pub(crate) struct ApplyArgs {
     /// Move values outside the probe's range to its nearest end
     #[arg(long)]
     pub(crate) clamp: bool,
+    /// Interpolate in the table, even where the probe has a smooth function
+    #[arg(long)]
+    pub(crate) table: bool,
+    /// Send the result through another probe; may be repeated
+    #[arg(long, value_name = "PROBE")]
+    pub(crate) then: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) textures: TextureArgs,
     #[command(flatten)]
@@ -338,6 +350,50 @@ pub(crate) struct TextureArgs {
 pub(crate) struct InspectArgs {
     /// The probe file
     pub(crate) probe: PathBuf,
+    /// Draw each target parameter over the source parameters, and a map of the error (.png, .svg)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plot: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct FitArgs {
+    /// The probe file
+    pub(crate) probe: PathBuf,
+    /// The probe with its fit; only the report without it
+    #[arg(short, long)]
+    pub(crate) output: Option<PathBuf>,
+    /// Entries that are rendered again to judge the fit, evenly spread; 0 for none
+    #[arg(long, default_value_t = 64)]
+    pub(crate) points: usize,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct InvertArgs {
+    /// The probe file
+    pub(crate) probe: PathBuf,
+    /// The probe that leads back
+    #[arg(short, long)]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct ComposeArgs {
+    /// The probe from A to B
+    pub(crate) first: PathBuf,
+    /// The probe from B to C
+    pub(crate) second: PathBuf,
+    /// Move what the second probe cannot take to the nearest value that it can
+    #[arg(long)]
+    pub(crate) clamp: bool,
+    /// The probe from A to C
+    #[arg(short, long)]
+    pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) json: Json,
 }

@@ -7,6 +7,7 @@ mod args;
 mod bench;
 mod commands;
 mod output;
+mod plot;
 mod renderers;
 mod report;
 mod transport;
@@ -50,6 +51,9 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Pairs(args) => commands::pairs::run(&args),
         Command::Cross(args) => commands::cross::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
+        Command::Fit(args) => commands::fit::run(&args),
+        Command::Invert(args) => commands::invert::run(&args),
+        Command::Compose(args) => commands::compose::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
         Command::Bench(args) => commands::bench::run(&args),

@@ -8,13 +8,16 @@
 mod apply;
 mod baseline;
 mod carry;
+mod compose;
 mod cross;
 mod cross_match;
 mod draft;
 mod error;
 mod explain;
+mod fit;
 mod from_pictures;
 mod gallery;
+mod inverse;
 mod journal;
 mod losses;
 mod options;
@@ -32,19 +35,24 @@ mod validate;
 
 pub use lookmatch_search::Axis;
 
-pub use apply::{Applied, apply};
+pub use apply::{Applied, apply, apply_table};
 pub use baseline::Baseline;
+pub use compose::{compose, measure};
 pub use cross::CrossStage;
 pub use error::RemapError;
 pub use explain::{Explanation, Tried, explain};
+pub use fit::{
+    Alternative, Candidate, Fit, FitForm, Function, Input, ParameterFit, Rerendered, Residual, Shape, Term,
+};
 pub use from_pictures::{PictureMatch, Pictures, match_pictures};
+pub use inverse::{Reach, invert};
 pub use journal::journal_path;
 pub use losses::{Loss, LossClass, losses};
 pub use options::{Assignment, Endpoint, Options, Preset, Side, Strategy, Vary};
 pub use pairs::{PairScore, score_pair};
 pub use picture_checks::{PictureCheck, Suspicion, check_pictures};
 pub use plan::Plan;
-pub use probe::{Entry, Metric, Noise, Probe, Totals};
+pub use probe::{Derived, DerivedKind, Entry, Flag, Metric, Noise, Probe, RoundTrip, Totals};
 pub use stage::{Appearance, Stage};
 pub use strategy::{Event, remap, remap_across};
 pub use studio::{Counts, RendererRecord, Sampling, Shot, Studio};

@@ -9,6 +9,7 @@ use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
 
 use crate::carry::{Body, SourceLook, carry_over};
+use crate::fit::Fit;
 use crate::options::{Preset, Strategy};
 use crate::plan::Plan;
 use crate::studio::{RendererRecord, Sampling};
@@ -61,8 +62,71 @@ pub struct Probe {
     pub renderers: Vec<RendererRecord>,
     /// Sums over the whole remap.
     pub totals: Totals,
+    /// How it came about, where no search found it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub derived: Option<Derived>,
+    /// Its smooth form, where it was fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Fit>,
     /// One entry per source point, in lexicographic order of the source axes.
     pub entries: Vec<Entry>,
+}
+
+/// How a probe came about that no search found. Its target values lie between the levels of its target axes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Derived {
+    /// From what.
+    pub kind: DerivedKind,
+    /// The probes that it was made of, as `MODEL -> MODEL`.
+    pub of: Vec<String>,
+    /// True where fitness and NRMSD were measured for its own entries; else they are sums of those of the probes, which they
+    /// cannot exceed by much (the fitness cannot exceed them at all where both were found in one scene).
+    pub measured: bool,
+    /// Of an inverse: what is left of the original source parameters after there and back, over the original entries.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub round_trip: Vec<RoundTrip>,
+    /// Places of entries whose source no target can show: theirs is the nearest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unreachable: Vec<usize>,
+}
+
+/// What a probe is derived from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DerivedKind {
+    /// One probe, backwards.
+    Inverse,
+    /// Two probes, one after the other.
+    Composition,
+}
+
+/// Error of one parameter after there and back, in its unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoundTrip {
+    /// The parameter.
+    pub name: String,
+    /// Mean absolute difference.
+    pub mean: f64,
+    /// Largest.
+    pub max: f64,
+    /// Entries that were sent there and back: those that have a result within the functions' domain.
+    pub entries: usize,
+}
+
+/// What makes an entry less than sure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Flag {
+    /// There is no result.
+    Failed,
+    /// A target parameter sits on the edge of its range.
+    Saturated,
+    /// Another target is as good within noise.
+    BelowNoise,
+    /// It carried no weight in the fit of some parameter.
+    OutsideFit,
+    /// No target shows its source: this is the nearest one (inverses only).
+    Unreachable,
 }
 
 /// Identity of the metric.
@@ -175,6 +239,8 @@ impl Probe {
             sampling: plan.sampling,
             renderers: plan.renderers.clone(),
             totals: Totals { evaluations, lattice_points },
+            derived: None,
+            fit: None,
             entries,
         }
     }
@@ -214,12 +280,33 @@ impl Probe {
 
     /// The entry at indices of the source axes.
     pub fn entry(&self, indices: &[usize]) -> &Entry {
-        let place = indices.iter().zip(&self.source_axes).fold(0, |sum, (i, axis)| sum * axis.len() + i);
-        &self.entries[place]
+        &self.entries[self.place(indices)]
+    }
+
+    /// The place of the entry at indices of the source axes.
+    pub(crate) fn place(&self, indices: &[usize]) -> usize {
+        indices.iter().zip(&self.source_axes).fold(0, |sum, (i, axis)| sum * axis.len() + i)
+    }
+
+    /// What makes the entry at a place less than sure.
+    pub fn flags(&self, place: usize) -> Vec<Flag> {
+        let entry = &self.entries[place];
+        let parameters = self.fit.iter().flat_map(|fit| &fit.parameters);
+        let is_outside = parameters.into_iter().any(|p| p.outside.contains(&place));
+        let is_unreachable = self.derived.as_ref().is_some_and(|d| d.unreachable.contains(&place));
+        let is_noisy = entry.noise.is_some_and(|noise| !noise.is_decided);
+        let flags = [
+            (entry.failed.is_some(), Flag::Failed),
+            (!entry.saturated.is_empty(), Flag::Saturated),
+            (is_noisy, Flag::BelowNoise),
+            (is_outside, Flag::OutsideFit),
+            (is_unreachable, Flag::Unreachable),
+        ];
+        flags.into_iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag).collect()
     }
 
     /// Indices of the source axes of the entry at a place.
-    fn indices(&self, mut place: usize) -> Vec<usize> {
+    pub(crate) fn indices(&self, mut place: usize) -> Vec<usize> {
         let mut indices: Vec<usize> = (self.source_axes.iter().rev())
             .map(|axis| {
                 let index = place % axis.len();
@@ -299,13 +386,19 @@ impl Probe {
             {
                 return Err(format!("entry {place} is of the source point {:?}, out of order", entry.source));
             }
-            let on_lattice =
-                self.target_axes.iter().zip(&entry.target).all(|(a, v)| a.index_of(*v).is_some());
+            let is_on = |(axis, v): (&Axis, &f64)| match self.derived {
+                None => axis.index_of(*v).is_some(),
+                Some(_) => (axis.value(0)..=axis.value(axis.len() - 1)).contains(v),
+            };
+            let on_lattice = self.target_axes.iter().zip(&entry.target).all(is_on);
             if !on_lattice {
                 return Err(format!("entry {place}: the target {:?} is off the target axes", entry.target));
             }
         }
-        Ok(())
+        if let Some(place) = self.derived.iter().flat_map(|d| &d.unreachable).find(|p| **p >= expected) {
+            return Err(format!("the field 'derived' speaks of entry {place}, which is not there"));
+        }
+        self.fit.as_ref().map_or(Ok(()), |fit| fit.check(self))
     }
 }
 

@@ -1,6 +1,7 @@
 //! `lookmatch apply`: one material through a probe.
 
-use lookmatch_remap::{Probe, apply};
+use lookmatch_materials::Material;
+use lookmatch_remap::{Applied, Probe, apply, apply_table};
 use serde_json::json;
 
 use crate::Usage;
@@ -31,7 +32,33 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
             return Err(Usage(format!("the probe maps {}; {missing}", names(&probe))).into());
         }
     }
-    let applied = apply(&probe, &source, args.clamp)?;
+    let mut applied = through(&probe, &source, args)?;
+    for file in &args.then {
+        let next = Probe::read(file)?;
+        let (given, taken) = (applied.target.model().name, next.from.model().name);
+        if given != taken {
+            let wrong = format!("'{}' starts from {taken}, but what goes into it is {given}", file.display());
+            return Err(Usage(wrong).into());
+        }
+        let on = through(&next, &applied.target, args)?;
+        // Differences along a chain add up to no more than their sum.
+        applied = Applied { source: applied.source, fitness: applied.fitness + on.fitness, ..on };
+    }
+    if args.json.json {
+        return print_json(&json!({
+            "source": applied.source, "target": applied.target, "spec": applied.target.to_string(),
+            "fitness": applied.fitness, "saturated": applied.saturated, "clamped": applied.clamped,
+            "forms": applied.forms.iter().map(|[name, form]| (name.clone(), json!(form))).collect::<serde_json::Map<_, _>>(),
+            "outside_fit": applied.outside_fit,
+        }));
+    }
+    print(&format!("{}\n", applied.target))
+}
+
+/// A material through a probe, with notes of what is less than sure.
+fn through(probe: &Probe, source: &Material, args: &ApplyArgs) -> anyhow::Result<Applied> {
+    let apply = if args.table { apply_table } else { apply };
+    let applied = apply(probe, source, args.clamp)?;
     for name in &applied.clamped {
         eprintln!("note: {name} was moved into the probe's range");
     }
@@ -40,13 +67,13 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
             "note: {name} sits on the edge of the range that was searched; a better match may lie beyond"
         );
     }
-    if args.json.json {
-        return print_json(&json!({
-            "source": applied.source, "target": applied.target, "spec": applied.target.to_string(),
-            "fitness": applied.fitness, "saturated": applied.saturated, "clamped": applied.clamped,
-        }));
+    for name in &applied.outside_fit {
+        eprintln!("note: {name} is the fit's, which saw no entry around here");
     }
-    print(&format!("{}\n", applied.target))
+    for [name, form] in applied.forms.iter().filter(|_| probe.fit.is_some()) {
+        eprintln!("{name}: {form}");
+    }
+    Ok(applied)
 }
 
 fn names(probe: &Probe) -> String {

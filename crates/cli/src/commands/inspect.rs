@@ -1,9 +1,12 @@
 //! `lookmatch inspect`: what is in a probe.
 
-use lookmatch_remap::{Axis, Entry, Probe, losses};
+use lookmatch_remap::{Axis, Entry, Flag, Probe, losses};
 use serde_json::json;
 
 use crate::args::InspectArgs;
+use crate::commands::check_output;
+use crate::commands::fit::fit_text;
+use crate::commands::invert::derived_text;
 use crate::output::{loss_table, noise_text, print, print_json, score, table};
 
 /// Worst points that are listed.
@@ -12,12 +15,45 @@ const WORST: usize = 5;
 pub(crate) fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let probe = Probe::read(&args.probe)?;
     let losses = losses(&probe)?;
+    if let Some(path) = &args.plot {
+        check_output(path)?;
+        crate::plot::draw(&probe, path)?;
+    }
     if args.json.json {
         let mut summary = summary(&probe);
         summary["losses"] = json!(losses);
+        summary["plot"] = json!(args.plot);
         return print_json(&summary);
     }
-    print(&format!("{}\nparameters of the source:\n{}", text(&probe), loss_table(&losses)))
+    let more = [sureness(&probe), fit_text(&probe), derived_text(&probe)]
+        .map(|t| if t.is_empty() { t } else { t + "\n" });
+    print(&format!("{}\n{}parameters of the source:\n{}", text(&probe), more.concat(), loss_table(&losses)))
+}
+
+/// How many entries are less than sure, and why.
+fn sureness(probe: &Probe) -> String {
+    let count = |flag: Flag| (0..probe.entries.len()).filter(|p| probe.flags(*p).contains(&flag)).count();
+    let all = [
+        (Flag::Failed, "have no result"),
+        (Flag::Saturated, "have a target parameter on the edge of its range"),
+        (Flag::BelowNoise, "are below noise: another target is as good"),
+        (Flag::OutsideFit, "carried no weight in the fit of some parameter"),
+        (Flag::Unreachable, "have no target that shows their source"),
+    ];
+    let line = |(flag, what): (Flag, &str)| match count(flag) {
+        0 => String::new(),
+        count => format!("  {count} of {} entries {what}\n", probe.entries.len()),
+    };
+    let lines: String = all.into_iter().map(line).collect();
+    if lines.is_empty() { lines } else { format!("how sure\n{lines}") }
+}
+
+/// The entries that are less than sure.
+fn flagged(probe: &Probe) -> Vec<serde_json::Value> {
+    let flagged = (0..probe.entries.len()).map(|place| (place, probe.flags(place)));
+    let told =
+        |(place, flags): (usize, Vec<Flag>)| json!({ "source": probe.entries[place].source, "flags": flags });
+    flagged.filter(|(_, flags)| !flags.is_empty()).map(told).collect()
 }
 
 fn summary(probe: &Probe) -> serde_json::Value {
@@ -33,6 +69,7 @@ fn summary(probe: &Probe) -> serde_json::Value {
         "mean_nrmsd": channel_means(probe, |e| e.nrmsd),
         "mean_nrmsd_masked": channel_means(probe, |e| e.nrmsd_masked),
         "saturated": probe.entries.iter().filter(|e| !e.saturated.is_empty()).count(),
+        "fit": probe.fit, "derived": probe.derived, "flagged": flagged(probe),
         "worst": worst(probe).iter().map(|e| json!(e)).collect::<Vec<_>>(),
     })
 }

@@ -14,6 +14,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
+use crate::commands::fit::{FIT_POINTS, fit_text, fit_to};
 use crate::commands::{check_output, create_folder};
 use crate::output::{bar, loss_table, noise_text, print_json};
 use crate::renderers::{Renderers, interruption, renderer_of};
@@ -60,7 +61,7 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         probe.entries.len(),
     );
     costs.iter().for_each(|cost| eprintln!("{}", cost.text()));
-    eprint!("{}", noise_text(&probe));
+    eprint!("{}{}", noise_text(&probe), fit_text(&probe));
     let losses = losses(&probe)?;
     eprint!("{}", loss_table(&losses));
     let validation = match (&args.report, stage) {
@@ -135,9 +136,10 @@ fn search_across(
     stopped: &Arc<AtomicBool>,
 ) -> anyhow::Result<(Probe, Vec<Cost>)> {
     let begun = Instant::now();
-    let probe = with_progress(plan, args, stopped, &mut |state, observe, stop| {
+    let mut probe = with_progress(plan, args, stopped, &mut |state, observe, stop| {
         remap_across(plan, stage, Some(state), observe, stop)
     })?;
+    fit_to(&mut probe, None, 0)?;
     let all = begun.elapsed().as_secs_f64();
     let counts = stage.counts();
     let waited: f64 = counts.iter().map(|(_, counts)| counts.waited.as_secs_f64()).sum();
@@ -172,9 +174,11 @@ fn search(plan: &Plan, args: &RemapArgs, stopped: &Arc<AtomicBool>) -> anyhow::R
     let preparation = Preparation::of("the reference scene");
     let stage = Stage::cached(plan, &cache(), &|progress| preparation.observe(progress))?;
     preparation.finish();
-    with_progress(plan, args, stopped, &mut |state, observe, stop| {
+    let mut probe = with_progress(plan, args, stopped, &mut |state, observe, stop| {
         remap(plan, &stage, Some(state), observe, stop)
-    })
+    })?;
+    fit_to(&mut probe, Some(&stage), FIT_POINTS)?;
+    Ok(probe)
 }
 
 /// A search: its state file, what it tells, when it stops.
