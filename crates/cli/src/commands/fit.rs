@@ -85,6 +85,22 @@ pub(crate) fn fit_text(probe: &Probe) -> String {
     text
 }
 
+/// The forms that a probe's fit uses; nothing where there is none.
+pub(crate) fn fit_summary(probe: &Probe) -> String {
+    let used = |parameter: &ParameterFit| {
+        let row =
+            rows_of(parameter).into_iter().find(|row| row.last().is_some_and(|mark| !mark.is_empty()))?;
+        Some(row.into_iter().take(4).collect())
+    };
+    let parameters = probe.fit.iter().flat_map(|fit| &fit.parameters);
+    let mut rows: Vec<Vec<String>> = parameters.filter_map(used).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    rows.insert(0, ["fit", "depends on", "form", "rms"].map(str::to_owned).to_vec());
+    table(&rows) + "  `lookmatch inspect` says how good other forms are, and why these\n"
+}
+
 /// A line for each form of a parameter, the one in use marked.
 fn rows_of(parameter: &ParameterFit) -> Vec<Vec<String>> {
     let depends = match (&parameter.depends_on[..], &parameter.closed, &parameter.local) {

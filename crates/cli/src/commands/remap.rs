@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
-use crate::commands::fit::{FIT_POINTS, fit_text, fit_to};
+use crate::commands::fit::{FIT_POINTS, fit_summary, fit_to};
 use crate::commands::{check_output, create_folder};
 use crate::output::{bar, loss_table, noise_text, print_json};
 use crate::renderers::{Renderers, interruption, renderer_of};
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         probe.entries.len(),
     );
     costs.iter().for_each(|cost| eprintln!("{}", cost.text()));
-    eprint!("{}{}", noise_text(&probe), fit_text(&probe));
+    eprint!("{}{}", noise_text(&probe), fit_summary(&probe));
     let losses = losses(&probe)?;
     eprint!("{}", loss_table(&losses));
     let validation = match (&args.report, stage) {
