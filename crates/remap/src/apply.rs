@@ -29,21 +29,21 @@ pub struct Applied {
 
 /// The target material that looks like a material of the probe's source model.
 ///
-/// Values come from the probe's fit where it has one that is adequate, else from the table: between tabulated points they are
-/// interpolated linearly along each axis; switches of two levels take the value of the nearest point. Parameters that the search left alone are carried over from the source.
+/// Values come from the table, so that tabulated points get what was found for them: between those they are interpolated
+/// linearly along each axis; switches of two levels take the value of the nearest point. Parameters that the search left alone are carried over from the source.
 ///
 /// # Errors
 /// A parameter that the source model does not have, or a value outside the tabulated range unless `clamp`.
 pub fn apply(probe: &Probe, source: &Material, clamp: bool) -> Result<Applied, RemapError> {
-    apply_with(probe, probe.fit.as_ref(), source, clamp)
+    apply_with(probe, None, source, clamp)
 }
 
-/// [`apply`] by the table alone.
+/// [`apply`] with values from the probe's fit where it has one that is adequate: without the steps of the lattice and of the search.
 ///
 /// # Errors
 /// As [`apply`].
-pub fn apply_table(probe: &Probe, source: &Material, clamp: bool) -> Result<Applied, RemapError> {
-    apply_with(probe, None, source, clamp)
+pub fn apply_smoothly(probe: &Probe, source: &Material, clamp: bool) -> Result<Applied, RemapError> {
+    apply_with(probe, probe.fit.as_ref(), source, clamp)
 }
 
 fn apply_with(

@@ -3,7 +3,7 @@
 use lookmatch_search::Axis;
 
 use crate::apply::{axis_value, check_fixed, is_outside, read};
-use crate::{Derived, DerivedKind, Entry, Noise, Probe, RemapError, Stage, Strategy, Totals, apply};
+use crate::{Derived, DerivedKind, Entry, Noise, Probe, RemapError, Stage, Strategy, Totals, apply_smoothly};
 
 /// The probe from the first one's source to the second one's target: each entry of the first goes through the second.
 ///
@@ -76,7 +76,7 @@ fn composed(first: &Probe, second: &Probe, entry: &Entry, clamp: bool) -> Result
         return failed(reason.clone());
     }
     let source = first.source_material(&entry.source)?;
-    let there = apply(first, &source, true)?;
+    let there = apply_smoothly(first, &source, true)?;
     check_fixed(second, &there.target)?;
     let point = (second.source_axes.iter())
         .map(|axis| axis_value(&there.target, axis))

@@ -35,7 +35,7 @@ mod validate;
 
 pub use lookmatch_search::Axis;
 
-pub use apply::{Applied, apply, apply_table};
+pub use apply::{Applied, apply, apply_smoothly};
 pub use baseline::Baseline;
 pub use compose::{compose, measure};
 pub use cross::CrossStage;

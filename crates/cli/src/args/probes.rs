@@ -16,9 +16,9 @@ pub(crate) struct ApplyArgs {
     /// Move values outside the probe's range to its nearest end
     #[arg(long)]
     pub(crate) clamp: bool,
-    /// Interpolate in the table, even where the probe has a smooth function
+    /// Take values from the probe's fit, where it has one, instead of interpolating in its table
     #[arg(long)]
-    pub(crate) table: bool,
+    pub(crate) smooth: bool,
     /// Send the result through another probe; may be repeated
     #[arg(long, value_name = "PROBE")]
     pub(crate) then: Vec<PathBuf>,

@@ -1,7 +1,7 @@
 //! `lookmatch apply`: one material through a probe.
 
 use lookmatch_materials::Material;
-use lookmatch_remap::{Applied, Probe, apply, apply_table};
+use lookmatch_remap::{Applied, Probe, apply, apply_smoothly};
 use serde_json::json;
 
 use crate::Usage;
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
 
 /// A material through a probe, with notes of what is less than sure.
 fn through(probe: &Probe, source: &Material, args: &ApplyArgs) -> anyhow::Result<Applied> {
-    let apply = if args.table { apply_table } else { apply };
+    let apply = if args.smooth { apply_smoothly } else { apply };
     let applied = apply(probe, source, args.clamp)?;
     for name in &applied.clamped {
         eprintln!("note: {name} was moved into the probe's range");
@@ -70,7 +70,7 @@ fn through(probe: &Probe, source: &Material, args: &ApplyArgs) -> anyhow::Result
     for name in &applied.outside_fit {
         eprintln!("note: {name} is the fit's, which saw no entry around here");
     }
-    for [name, form] in applied.forms.iter().filter(|_| probe.fit.is_some()) {
+    for [name, form] in applied.forms.iter().filter(|_| args.smooth) {
         eprintln!("{name}: {form}");
     }
     Ok(applied)

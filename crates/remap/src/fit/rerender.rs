@@ -26,7 +26,7 @@ pub struct Rerendered {
     pub masked: bool,
     /// With the table's values.
     pub table: f64,
-    /// With all values as [`crate::apply()`] takes them.
+    /// With all values as [`crate::apply_smoothly()`] takes them.
     pub fit: f64,
     /// With closed forms wherever there are some; absent where there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -4,7 +4,9 @@ use lookmatch_materials::{Material, Role, by_name};
 use lookmatch_search::Axis;
 
 use super::{Fit, FitForm, Function, Shape};
-use crate::{Entry, Flag, Options, Plan, Probe, RemapError, Strategy, apply, apply_table, compose, invert};
+use crate::{
+    Entry, Flag, Options, Plan, Probe, RemapError, Strategy, apply, apply_smoothly, compose, invert,
+};
 
 /// A probe whose target values are functions of its source's specular reflectance and roughness, rounded to the lattice.
 fn probe(from: &str, to: &str, strategy: Strategy, truth: &dyn Fn(f64, f64) -> Vec<f64>) -> Probe {
@@ -97,7 +99,8 @@ fn tables_without_a_smooth_relation_stay() {
     assert_eq!(fit.evaluate(&probe, &[0.1, 0.1])[1], None);
     let probe = Probe { fit: Some(fit), ..probe };
     let ward = Material::parse("ward:specular=0.1,roughness=0.11").unwrap();
-    let (smooth, table) = (apply(&probe, &ward, false).unwrap(), apply_table(&probe, &ward, false).unwrap());
+    let (smooth, table) =
+        (apply_smoothly(&probe, &ward, false).unwrap(), apply(&probe, &ward, false).unwrap());
     assert_eq!(smooth.target.number("roughness").unwrap(), table.target.number("roughness").unwrap());
     assert_eq!(smooth.forms[1], ["roughness".to_owned(), "table".to_owned()]);
     assert!(smooth.forms[0][1].contains("polynomial") && table.forms[0][1] == "table");
@@ -139,7 +142,7 @@ fn unsure_entries_count_less_or_not_at_all() {
     assert!(probe.flags(silent).contains(&Flag::OutsideFit) && !probe.flags(silent).contains(&Flag::Failed));
     // Functions reach over what failed.
     let ward = Material::parse("ward:specular=0.2,roughness=0.31").unwrap();
-    assert!(apply(&probe, &ward, false).is_ok());
+    assert!(apply_smoothly(&probe, &ward, false).is_ok());
 }
 
 #[test]
@@ -177,7 +180,7 @@ fn the_inverse_of_a_bijection_leads_back() {
     }
     for (s, r) in [(0.1, 0.2), (0.3, 0.5), (0.05, 0.6)] {
         let ward = Material::parse(&format!("ward:specular={s},roughness={r}")).unwrap();
-        let target = apply(&there, &ward, false).unwrap().target;
+        let target = apply_smoothly(&there, &ward, false).unwrap().target;
         let home = apply(&back, &target, false).unwrap().target;
         assert!((home.by_role(Role::SpecularReflectance).unwrap().colour().unwrap()[0] - s).abs() < 2e-3);
         assert!((home.number("roughness_u").unwrap() - r).abs() < 2e-3, "{home}");
@@ -210,7 +213,7 @@ fn a_composition_is_one_probe_after_the_other() {
     for place in [0, 3, 100, 400, 699] {
         let entry = &both.entries[place];
         let source = both.source_material(&entry.source).unwrap();
-        let twice = apply(&second, &apply(&first, &source, false).unwrap().target, false).unwrap();
+        let twice = apply(&second, &apply_smoothly(&first, &source, false).unwrap().target, false).unwrap();
         let once = apply(&both, &source, false).unwrap();
         // Bodies go straight from A to C, and A-S has none.
         let specular = |m: &Material| m.by_role(Role::SpecularReflectance).unwrap().colour().unwrap()[0];
