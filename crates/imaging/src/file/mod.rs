@@ -68,10 +68,10 @@ pub fn write(path: &Path, image: &Image, notes: &[(String, String)]) -> Result<(
     })
 }
 
-/// The content of the file that [`write`] would write; `path` gives its format and its name in messages.
+/// The content of the file that [`write()`] would write; `path` gives its format and its name in messages.
 ///
 /// # Errors
-/// As [`write`], but for what the operating system refuses.
+/// As [`write()`], but for what the operating system refuses.
 pub fn encode(path: &Path, image: &Image, notes: &[(String, String)]) -> Result<Vec<u8>, ImageError> {
     let encode = match extension(path).as_deref() {
         Some("exr") => exr::encode,
