@@ -30,6 +30,7 @@ mod settle;
 mod stage;
 mod strategy;
 mod studio;
+mod synthesis;
 mod table;
 mod validate;
 
@@ -55,6 +56,7 @@ pub use plan::Plan;
 pub use probe::{Derived, DerivedKind, Entry, Flag, Metric, Noise, Probe, RoundTrip, Totals};
 pub use stage::{Appearance, Stage};
 pub use strategy::{Event, remap, remap_across};
+pub use synthesis::SynthesisRecord;
 pub use studio::{Counts, RendererRecord, Sampling, Shot, Studio};
 pub use validate::{
     Lighting, MethodScores, Scores, Statistics, ValidationReport, Validator, validation_points,

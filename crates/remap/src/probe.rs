@@ -13,6 +13,7 @@ use crate::fit::Fit;
 use crate::options::{Preset, Strategy};
 use crate::plan::Plan;
 use crate::studio::{RendererRecord, Sampling};
+use crate::synthesis::SynthesisRecord;
 use crate::{RemapError, plan};
 
 /// Version of the file format that is written; older ones are read, newer ones refused.
@@ -151,6 +152,21 @@ pub struct Totals {
     pub evaluations: usize,
     /// Points of the target lattice.
     pub lattice_points: usize,
+    /// Distinct target materials that were rendered for these comparisons since the remap was last resumed; absent in older
+    /// files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rendered: Option<usize>,
+    /// How far synthesised pictures could be trusted, where there were any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub synthesis: Option<SynthesisRecord>,
+}
+
+impl Totals {
+    /// Of a probe that no search found.
+    pub(crate) fn derived(target_axes: &[Axis]) -> Self {
+        let lattice_points = target_axes.iter().map(Axis::len).product();
+        Self { evaluations: 0, lattice_points, rendered: None, synthesis: None }
+    }
 }
 
 /// The result for one source point.
@@ -238,7 +254,7 @@ impl Probe {
             size: plan.size,
             sampling: plan.sampling,
             renderers: plan.renderers.clone(),
-            totals: Totals { evaluations, lattice_points },
+            totals: Totals { evaluations, lattice_points, rendered: None, synthesis: None },
             derived: None,
             fit: None,
             entries,

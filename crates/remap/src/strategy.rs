@@ -11,8 +11,9 @@ use lookmatch_search::{
 use rayon::prelude::*;
 
 use crate::carry::SourceLook;
-use crate::gallery::{Match, Stopped, stopped};
+use crate::gallery::{Match, Stopped, family, stopped};
 use crate::journal::Journal;
+use crate::synthesis::Syntheses;
 use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{CrossStage, Entry, Plan, Probe, RemapError, Stage, Strategy};
 
@@ -117,6 +118,14 @@ impl<'a> From<Own<'a>> for Eye<'a> {
 }
 
 impl Eye<'_> {
+    /// What it knows of targets.
+    fn syntheses(&self) -> &Syntheses {
+        match self {
+            Self::Own(Own { stage, .. }) => &stage.syntheses,
+            Self::Cross(stage) => &stage.own.syntheses,
+        }
+    }
+
     /// The match of one source point.
     fn find(
         &self,
@@ -150,6 +159,8 @@ fn run(
 ) -> Result<Probe, RemapError> {
     let lattice = Lattice { axes: plan.target_axes.clone() };
     let sources = Lattice { axes: plan.source_axes.clone() };
+    let syntheses = eye.syntheses();
+    syntheses.clear();
     let total = sources.len();
     let mut found: Vec<Option<(Point, Entry)>> = vec![None; total];
     let mut journal = match state {
@@ -209,7 +220,10 @@ fn run(
     if let Some(journal) = journal {
         journal.remove();
     }
-    Ok(Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len()))
+    let mut probe = Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len());
+    probe.totals.rendered = Some(table.map_or_else(|| syntheses.rendered(), |(table, _)| table.len()));
+    probe.totals.synthesis = syntheses.record();
+    Ok(probe)
 }
 
 /// An error of a search, with what was done where it was stopped from outside.
@@ -272,7 +286,8 @@ fn search_one(
     let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
     let (lattice, compared) = (problem.lattice, HashSet::new());
     let look = SourceLook::rounded(&source);
-    let mut objective = Match { plan, stage, lattice, source: look, appearance, compared, stop };
+    let family = family(plan, &look)?;
+    let mut objective = Match { plan, stage, lattice, source: look, appearance, compared, family, stop };
     let found = searched(plan, problem, &mut objective)?;
     let target = plan.target_material(&source, &lattice.values(&found.best))?;
     let seen = stage.known_appearances(&[target]).swap_remove(0);

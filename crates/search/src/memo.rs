@@ -39,6 +39,11 @@ impl<'a> Memo<'a> {
         self.objective.forecast(points)
     }
 
+    /// [`Objective::is_linear`].
+    pub fn is_linear(&self, axis: usize) -> bool {
+        self.objective.is_linear(axis)
+    }
+
     /// Fitness of a point that has been evaluated.
     pub fn get(&self, point: &Point) -> Option<f64> {
         self.known.get(point).copied()

@@ -18,6 +18,12 @@ pub trait Objective {
         let _ = points;
         None
     }
+
+    /// True where forecasts along an axis follow from what is evaluated at its two ends; never by default.
+    fn is_linear(&self, axis: usize) -> bool {
+        let _ = axis;
+        false
+    }
 }
 
 /// An [`Objective`] from a plain function of one point that cannot fail.

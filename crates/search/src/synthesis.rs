@@ -21,6 +21,8 @@ use crate::{
 const ROUNDS: usize = 40;
 /// Forecasts up to this number are all made; of more the best is searched.
 const ALL: usize = 50_000;
+/// Points that are evaluated at once, at most.
+const BATCH: usize = 64;
 /// Levels that span more than this ratio are spread by their logarithm.
 const WIDE_RATIO: f64 = 12.0;
 
@@ -56,12 +58,18 @@ impl Synthesis {
         Synthesis { first: First::HalfRate, ..Synthesis::default() }
     }
 
-    /// The points that are evaluated where nothing is known.
-    fn first(&self, problem: &Problem) -> Vec<Point> {
+    /// The points that are evaluated where nothing is known; of the axes that are `linear`, the ends.
+    fn first(&self, problem: &Problem, linear: &[bool]) -> Vec<Point> {
         let whole = Bounds::full(problem.lattice);
         match self.first {
-            First::HalfRate => whole.points().filter(|point| is_half(&problem.lattice.axes, point)).collect(),
-            First::Spread => first_points(&problem.lattice.axes, &whole),
+            First::HalfRate => {
+                let half: Vec<Point> =
+                    whole.points().filter(|point| is_half(&problem.lattice.axes, point)).collect();
+                // Batches that are spread over the lattice themselves.
+                let stride = half.len().div_ceil(BATCH);
+                (0..stride).flat_map(|first| half.iter().skip(first).step_by(stride).cloned()).collect()
+            }
+            First::Spread => first_points(&problem.lattice.axes, &whole, linear),
         }
     }
 }
@@ -79,7 +87,10 @@ impl Search for Synthesis {
         let mut memo = Memo::new(problem.lattice, objective);
         let centre = problem.bounds.points().next().ok_or(SearchError::NothingEvaluated)?;
         if memo.forecast(std::slice::from_ref(&centre)).is_none() {
-            memo.evaluate(&self.first(problem))?;
+            let linear: Vec<bool> = (0..problem.lattice.axes.len()).map(|axis| memo.is_linear(axis)).collect();
+            for batch in self.first(problem, &linear).chunks(BATCH) {
+                memo.evaluate(batch)?;
+            }
         }
         // The points that were evaluated first may lie outside the bounds: the best must not.
         let mut best: Option<(f64, Point)> = None;
@@ -148,32 +159,33 @@ fn is_half(axes: &[Axis], point: &Point) -> bool {
     axes.iter().zip(point).all(is_kept)
 }
 
-/// Evenly spread points and the corners of the axes with more than two levels, switches on; and each switch off once.
-fn first_points(axes: &[Axis], whole: &Bounds) -> Vec<Point> {
+/// Evenly spread points and the corners of the axes with more than two levels, switches on; and each switch off once. Points
+/// lie at both ends of the axes that are linear.
+fn first_points(axes: &[Axis], whole: &Bounds, linear: &[bool]) -> Vec<Point> {
     let is_switch = |axis: usize| axes[axis].len() == 2;
-    let wide: Vec<usize> = (0..axes.len()).filter(|axis| axes[*axis].len() > 2).collect();
+    let wide: Vec<usize> = (0..axes.len()).filter(|axis| axes[*axis].len() > 2 && !linear[*axis]).collect();
     let mut cube = whole.clone();
-    (0..axes.len()).filter(|axis| is_switch(*axis)).for_each(|axis| cube.low[axis] = cube.high[axis]);
+    (0..axes.len()).filter(|axis| !wide.contains(axis)).for_each(|axis| cube.low[axis] = cube.high[axis]);
     let count = 2 * (wide.len() + 1) * (wide.len() + 2);
     let mut points: Vec<Point> = Vec::new();
-    let mut add = |point: Point| {
-        if !points.contains(&point) {
-            points.push(point);
-        }
-    };
     for corner in 0..1u32 << wide.len().min(3) {
         let mut point = cube.high.clone();
         wide.iter().enumerate().filter(|(k, _)| corner >> k & 1 == 0).for_each(|(_, axis)| point[*axis] = 0);
-        add(point);
+        points.push(point);
     }
-    for k in 0..count as u32 {
-        add(warped(axes, &cube, &spread(&cube, k)));
-    }
+    points.extend((0..count as u32).map(|k| warped(axes, &cube, &spread(&cube, k))));
+    let ends = |point: Point| {
+        let low: Point = (0..axes.len()).map(|axis| if linear[axis] { 0 } else { point[axis] }).collect();
+        [low, point]
+    };
+    let mut points: Vec<Point> = points.into_iter().flat_map(ends).collect();
     for axis in (0..axes.len()).filter(|axis| is_switch(*axis)) {
         let mut point = points[points.len() / 2].clone();
         point[axis] = 0;
         points.push(point);
     }
+    let mut seen = std::collections::HashSet::new();
+    points.retain(|point| seen.insert(point.clone()));
     points
 }
 
@@ -273,15 +285,17 @@ mod tests {
         ];
         let lattice = Lattice { axes };
         let problem = Problem { lattice: &lattice, bounds: Bounds::full(&lattice), guesses: vec![], seed: 1 };
-        let points = Synthesis::half_rate().first(&problem);
+        let points = Synthesis::half_rate().first(&problem, &[false; 2]);
         let expected = [0, 1].map(|s| [0, 2, 4, 5].map(|x| vec![s, x])).concat();
         assert_eq!(points, expected);
+        let switch = first_points(&lattice.axes, &Bounds::full(&lattice), &[false, true]);
+        assert_eq!(switch, [vec![1, 0], vec![1, 5], vec![0, 5]]);
     }
 
     #[test]
     fn wide_ranges_are_spread_by_ratios() {
         let axes = vec![Axis::regular("alpha", 0.01, 0.7, 0.01).expect("a sound axis")];
-        let points = first_points(&axes, &Bounds::full(&Lattice { axes: axes.clone() }));
+        let points = first_points(&axes, &Bounds::full(&Lattice { axes: axes.clone() }), &[false]);
         let below = points.iter().filter(|point| axes[0].value(point[0] as usize) < 0.1).count();
         assert!(2 * below >= points.len() - 1, "{points:?}");
     }
