@@ -15,8 +15,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Methods that search a source of its own.
-const METHODS: [&str; 6] =
-    ["genetic-guarnera2018", "genetic", "cma-es", "survey", "synthesis", "synthesis-half-rate"];
+const METHODS: [&str; 5] = ["genetic-guarnera2018", "genetic", "cma-es", "survey", "synthesis"];
 /// Methods of whole remaps.
 const WHOLE: [&str; 4] = ["genetic-guarnera2018", "genetic", "synthesis", "synthesis-half-rate"];
 /// Sources of a whole remap.
@@ -38,7 +37,8 @@ const PAIRS: [Pair; 3] = [
 
 /// The default plan of a pair with a search method.
 fn plan(pair: &Pair, search: &str, size: usize, strategy: Strategy) -> Plan {
-    let options = Options { strategy, search: search.into(), size: Some(size), mask: true, ..Options::default() };
+    let options =
+        Options { strategy, search: search.into(), size: Some(size), mask: true, ..Options::default() };
     let model = |name| by_name(name).expect("a model of the catalogue");
     Plan::new(model(pair.from), model(pair.to), &options).expect("a sound plan")
 }
@@ -49,7 +49,11 @@ fn level(axis: &Axis, share: f64) -> f64 {
     if min > 0.0 && max / min > 12.0 { min * (max / min).powf(share) } else { min + share * (max - min) }
 }
 
-fn axes(plan: &Plan, counts: impl Iterator<Item = usize>, share: &mut dyn FnMut(usize, usize) -> f64) -> Vec<Axis> {
+fn axes(
+    plan: &Plan,
+    counts: impl Iterator<Item = usize>,
+    share: &mut dyn FnMut(usize, usize) -> f64,
+) -> Vec<Axis> {
     let axis = |(axis, count): (&Axis, usize)| {
         let mut levels: Vec<f64> = (0..count).map(|k| level(axis, share(k, count))).collect();
         levels.sort_by(f64::total_cmp);
@@ -72,7 +76,9 @@ struct Row {
 
 impl Row {
     fn add(&mut self, found: &Probe, truth: &[f64]) {
-        self.ratios.extend(found.entries.iter().zip(truth).map(|(entry, truth)| (entry.fitness + 1e-9) / (truth + 1e-9)));
+        self.ratios.extend(
+            found.entries.iter().zip(truth).map(|(entry, truth)| (entry.fitness + 1e-9) / (truth + 1e-9)),
+        );
         let rendered = found.totals.rendered.unwrap_or(0) as f64;
         self.renders.push(rendered / found.entries.len() as f64);
     }
@@ -98,7 +104,11 @@ fn alone(pair: &Pair, size: usize, stage: &Stage) {
     truth.source_axes = axes(&truth, counts, &mut |_, _| random.random());
     let begin = std::time::Instant::now();
     let best = run(&truth, stage);
-    println!("  exhaustive: {} renders, {:.0} s", best.totals.rendered.unwrap_or(0), begin.elapsed().as_secs_f64());
+    println!(
+        "  exhaustive: {} renders, {:.0} s",
+        best.totals.rendered.unwrap_or(0),
+        begin.elapsed().as_secs_f64()
+    );
     for method in METHODS {
         let (mut row, begin) = (Row::default(), std::time::Instant::now());
         for entry in &best.entries {
@@ -114,7 +124,9 @@ fn alone(pair: &Pair, size: usize, stage: &Stage) {
 
 /// A whole remap.
 fn together(pair: &Pair, size: usize, stage: &Stage) {
-    for (strategy, name) in [(Strategy::Unconstrained, "unconstrained"), (Strategy::Constrained, "constrained")] {
+    for (strategy, name) in
+        [(Strategy::Unconstrained, "unconstrained"), (Strategy::Constrained, "constrained")]
+    {
         let mut truth = plan(pair, "exhaustive", size, strategy);
         let counts = pair.counts.iter().map(|(_, together)| *together);
         truth.source_axes = axes(&truth, counts, &mut |k, count| k as f64 / (count - 1) as f64);
@@ -136,7 +148,10 @@ fn main() {
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     let size = arguments.next().and_then(|a| a.parse().ok()).unwrap_or(128);
     let only = arguments.next();
-    println!("{:<52}{:>10}{:>10}{:>10}{:>10}{:>9}", "fitness over optimum, renders per source", "mean", "worst", "renders", "most", "s");
+    println!(
+        "{:<52}{:>10}{:>10}{:>10}{:>10}{:>9}",
+        "fitness over optimum, renders per source", "mean", "worst", "renders", "most", "s"
+    );
     for pair in PAIRS.iter().filter(|pair| only.as_ref().is_none_or(|only| only == pair.from)) {
         println!("{} -> {}, {size} px", pair.from, pair.to);
         let stage = Stage::prepare(&plan(pair, "genetic", size, Strategy::Unconstrained)).expect("the scene");

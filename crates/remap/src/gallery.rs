@@ -10,7 +10,7 @@ use lookmatch_search::{Lattice, Objective, ObjectiveError, Point, SearchError};
 use lru::LruCache;
 use rayon::prelude::*;
 
-use crate::carry::SourceLook;
+use crate::carry::{Body, SourceLook};
 use crate::stage::{Appearance, Stage};
 use crate::synthesis::{Rendered, Synthesis, is_linear};
 use crate::{Plan, RemapError};
@@ -104,7 +104,8 @@ impl Match<'_> {
             Synthesis::new(self.plan.to.model(), self.lattice, self.stage.picture_shares())
         });
         let new: Vec<usize> = (0..points.len()).filter(|k| !synthesis.knows(&points[*k])).collect();
-        let rendered = |k: &usize| Rendered { point: points[*k].clone(), pictures: self.stage.pictures(&seen[*k]) };
+        let rendered =
+            |k: &usize| Rendered { point: points[*k].clone(), pictures: self.stage.pictures(&seen[*k]) };
         let rendered: Vec<Rendered> = new.iter().map(rendered).collect();
         // Only what lies between linear pictures needs them.
         let planes = OnceCell::new();
@@ -153,8 +154,8 @@ pub(crate) fn stopped() -> RemapError {
 }
 
 /// What targets of a source have in common: everything but what is searched.
-pub(crate) fn family(plan: &Plan, source: &SourceLook) -> Result<Option<Key>, RemapError> {
+pub(crate) fn family(plan: &Plan, source: &SourceLook, body: Body) -> Result<Option<Key>, RemapError> {
     let first: Vec<f64> = plan.target_axes.iter().map(|axis| axis.value(axis.len() - 1)).collect();
     let is_synthesised = plan.search.starts_with("synthesis");
-    is_synthesised.then(|| Ok(key(&plan.target_beside(source, &first)?))).transpose()
+    is_synthesised.then(|| Ok(key(&plan.target_with(source, &first, body)?))).transpose()
 }

@@ -26,6 +26,7 @@ mod picture_checks;
 mod plan;
 mod probe;
 mod projection;
+mod refine;
 mod settle;
 mod stage;
 mod strategy;
@@ -49,15 +50,15 @@ pub use from_pictures::{PictureMatch, Pictures, match_pictures};
 pub use inverse::{Reach, invert};
 pub use journal::journal_path;
 pub use losses::{Loss, LossClass, losses};
-pub use options::{Assignment, Endpoint, Options, Preset, Side, Strategy, Vary};
+pub use options::{Assignment, Endpoint, Options, Pair, Preset, Side, Strategy, Vary};
 pub use pairs::{PairScore, score_pair};
 pub use picture_checks::{PictureCheck, Suspicion, check_pictures};
 pub use plan::Plan;
 pub use probe::{Derived, DerivedKind, Entry, Flag, Metric, Noise, Probe, RoundTrip, Totals};
 pub use stage::{Appearance, Stage};
 pub use strategy::{Event, remap, remap_across};
-pub use synthesis::SynthesisRecord;
 pub use studio::{Counts, RendererRecord, Sampling, Shot, Studio};
+pub use synthesis::SynthesisRecord;
 pub use validate::{
     Lighting, MethodScores, Scores, Statistics, ValidationReport, Validator, validation_points,
 };

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::carry::{Body, SourceLook, carry_over};
 use crate::fit::Fit;
-use crate::options::{Preset, Strategy};
+use crate::options::{Pair, Preset, Strategy};
 use crate::plan::Plan;
 use crate::studio::{RendererRecord, Sampling};
 use crate::synthesis::SynthesisRecord;
@@ -49,6 +49,12 @@ pub struct Probe {
     pub preset: Option<Preset>,
     /// Seed.
     pub seed: u64,
+    /// Which target parameters followed which source parameters, where roles did not decide.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<Pair>,
+    /// True where targets may lie between the levels of the target axes.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refined: bool,
     /// What was minimised.
     pub metric: Metric,
     /// The scene that was compared.
@@ -243,6 +249,8 @@ impl Probe {
             search: plan.search.clone(),
             preset: plan.preset,
             seed: plan.seed,
+            pairs: plan.pairs.clone(),
+            refined: plan.refine,
             metric: Metric {
                 name: "guarnera-2018-eq3".into(),
                 space: plan.metric.space,
@@ -403,8 +411,8 @@ impl Probe {
                 return Err(format!("entry {place} is of the source point {:?}, out of order", entry.source));
             }
             let is_on = |(axis, v): (&Axis, &f64)| match self.derived {
-                None => axis.index_of(*v).is_some(),
-                Some(_) => (axis.value(0)..=axis.value(axis.len() - 1)).contains(v),
+                None if !self.refined => axis.index_of(*v).is_some(),
+                _ => (axis.value(0)..=axis.value(axis.len() - 1)).contains(v),
             };
             let on_lattice = self.target_axes.iter().zip(&entry.target).all(is_on);
             if !on_lattice {

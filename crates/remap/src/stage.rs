@@ -184,13 +184,18 @@ impl Stage {
     /// The pictures of an appearance, weighted per pixel: specular and diffuse ones under both lights.
     pub(crate) fn pictures(&self, seen: &Appearance) -> Pictures {
         let images = [&seen.specular, &*seen.diffuse];
-        images.into_iter().flat_map(|i| [&i.point, &i.environment]).map(|lab| self.weighted(lab.clone())).collect()
+        images
+            .into_iter()
+            .flat_map(|i| [&i.point, &i.environment])
+            .map(|lab| self.weighted(lab.clone()))
+            .collect()
     }
 
     /// The pictures of a material whose BSDF lies between two others, given their linear planes and the share of the second.
     pub(crate) fn mixed_pictures(&self, [a, b]: [&[[Planes; 2]; 2]; 2], share: f64) -> Pictures {
         let share = share as f32;
-        let mixed = |(a, b): (&Vec<f32>, &Vec<f32>)| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
+        let mixed =
+            |(a, b): (&Vec<f32>, &Vec<f32>)| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
         let picture = |part: usize, light: usize| {
             let (a, b) = (&a[part][light], &b[part][light]);
             self.weighted(lab(&std::array::from_fn(|c| mixed((&a[c], &b[c])))))

@@ -87,7 +87,8 @@ impl Search for Synthesis {
         let mut memo = Memo::new(problem.lattice, objective);
         let centre = problem.bounds.points().next().ok_or(SearchError::NothingEvaluated)?;
         if memo.forecast(std::slice::from_ref(&centre)).is_none() {
-            let linear: Vec<bool> = (0..problem.lattice.axes.len()).map(|axis| memo.is_linear(axis)).collect();
+            let linear: Vec<bool> =
+                (0..problem.lattice.axes.len()).map(|axis| memo.is_linear(axis)).collect();
             for batch in self.first(problem, &linear).chunks(BATCH) {
                 memo.evaluate(batch)?;
             }

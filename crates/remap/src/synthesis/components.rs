@@ -41,7 +41,10 @@ impl Components {
         for k in order {
             let value = eigen.eigenvalues[k];
             // Below a share of 1e-12 there is nothing but rounding.
-            if rest <= tolerance * tolerance * count as f64 || value <= 1e-12 * total || directions.len() == MOST {
+            if rest <= tolerance * tolerance * count as f64
+                || value <= 1e-12 * total
+                || directions.len() == MOST
+            {
                 break;
             }
             let scale = value.sqrt();

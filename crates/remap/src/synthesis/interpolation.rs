@@ -106,13 +106,15 @@ fn system(centres: &[Vec<f64>], smoothing: f64) -> Option<DMatrix<f64>> {
     let count = centres.len();
     let axes = centres.first()?.len();
     (count > axes).then(|| {
-        DMatrix::from_fn(count + axes + 1, count + axes + 1, |i, k| match (i.checked_sub(count), k.checked_sub(count)) {
-            (None, None) if i == k => smoothing,
-            (None, None) => kernel(&centres[i], &centres[k]),
-            (Some(0), None) | (None, Some(0)) => 1.0,
-            (Some(axis), None) => centres[k][axis - 1],
-            (None, Some(axis)) => centres[i][axis - 1],
-            (Some(_), Some(_)) => 0.0,
+        DMatrix::from_fn(count + axes + 1, count + axes + 1, |i, k| {
+            match (i.checked_sub(count), k.checked_sub(count)) {
+                (None, None) if i == k => smoothing,
+                (None, None) => kernel(&centres[i], &centres[k]),
+                (Some(0), None) | (None, Some(0)) => 1.0,
+                (Some(axis), None) => centres[k][axis - 1],
+                (None, Some(axis)) => centres[i][axis - 1],
+                (Some(_), Some(_)) => 0.0,
+            }
         })
     })
 }

@@ -14,6 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use lookmatch_materials::fresnel::f0_from_ior;
 use lookmatch_materials::{Material, Model, Role};
 use lookmatch_search::{Axis, Lattice, Point};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::gallery::{Key, key};
@@ -31,6 +32,10 @@ const BETWEEN: usize = 8;
 const MANY: usize = 120;
 /// ... but for those that were further off than this, in fitness.
 const OFF: f64 = 0.05;
+/// Points beyond which a function of its own is put through those around each place ...
+const WHOLE: usize = 400;
+/// ... of which there are so many.
+const AROUND: usize = 40;
 /// Least α that is told from smaller ones, and least reflectance.
 const LEAST: f64 = 1e-3;
 
@@ -154,7 +159,10 @@ struct Stratum {
 enum Surface {
     /// Too little is known: those of the nearest point.
     Nearest,
+    /// Through all points.
     Smooth(Interpolation),
+    /// Through those around a place: the points and their loadings.
+    Local(Metric, Vec<Vec<f64>>),
 }
 
 impl Coordinate {
@@ -162,7 +170,8 @@ impl Coordinate {
         let role = model.parameter(&axis.name).map(|parameter| parameter.role);
         let value = |level: &f64| role.as_ref().map_or(*level, |role| even(*role, *level));
         let raw: Vec<f64> = axis.levels.iter().map(value).collect();
-        let (min, max) = raw.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (min, max) =
+            raw.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let length = if max > min { max - min } else { 1.0 };
         Self {
             values: raw.iter().map(|v| (v - min) / length).collect(),
@@ -223,9 +232,10 @@ impl Synthesis {
             };
             self.components = (0..self.shares.len()).map(kind).collect();
         }
+        // Whole batches are what a synthesis starts from; candidates come one by one, and were foreseen.
+        let error = if let [one] = rendered { self.error(&one.point, &one.pictures) } else { None };
+        self.errors.extend(error);
         for Rendered { point, pictures } in rendered {
-            let error = self.error(point, pictures);
-            self.errors.extend(error);
             self.learnt.insert(point.clone());
             self.add(point, pictures, error);
         }
@@ -319,10 +329,17 @@ impl Synthesis {
                 stratum.foreseen.insert(points[*k].clone(), loadings);
             }
             for (k, _) in &group {
-                distances[*k] = self.shares.iter().zip(seen).fold((0.0, 0), |(sum, first), (share, seen)| {
-                    let foreseen = stratum.foreseen[&points[*k]].get(first..first + seen.values.len()).unwrap_or(&[]);
-                    (sum + share * distance(seen, foreseen), first + seen.values.len())
-                }).0;
+                distances[*k] = self
+                    .shares
+                    .iter()
+                    .zip(seen)
+                    .fold((0.0, 0), |(sum, first), (share, seen)| {
+                        let foreseen = stratum.foreseen[&points[*k]]
+                            .get(first..first + seen.values.len())
+                            .unwrap_or(&[]);
+                        (sum + share * distance(seen, foreseen), first + seen.values.len())
+                    })
+                    .0;
             }
             is_known = true;
         }
@@ -358,21 +375,45 @@ impl Stratum {
         let known = self.metric.take().unwrap_or_else(|| Metric::plain(axes));
         let metric = known.tuned(&self.points, &values);
         self.metric = Some(metric.clone());
-        let smooth = (self.points.len() >= FEWEST).then(|| Interpolation::fit(metric, &self.points, &values));
-        self.function = Some(smooth.flatten().map_or(Surface::Nearest, Surface::Smooth));
+        let smooth = |metric| Interpolation::fit(metric, &self.points, &values).map(Surface::Smooth);
+        let function = match self.points.len() {
+            0..FEWEST => None,
+            FEWEST..WHOLE => smooth(metric),
+            _ => Some(Surface::Local(metric, values)),
+        };
+        self.function = Some(function.unwrap_or(Surface::Nearest));
     }
 
     fn loadings_at(&self, places: &[Vec<f64>], lengths: &[usize]) -> Vec<Vec<f64>> {
-        let squared = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        let nearest = |place: &Vec<f64>| {
-            let points = self.points.iter().zip(&self.loadings);
-            let nearest = points.min_by(|(a, _), (b, _)| squared(a, place).total_cmp(&squared(b, place)));
-            nearest.map_or_else(Vec::new, |(_, row)| joined(row, lengths))
-        };
+        let nearest = |place: &Vec<f64>| joined(&self.loadings[self.around(place, 1)[0]], lengths);
         match &self.function {
             Some(Surface::Smooth(function)) => function.at_all(places),
-            _ => places.iter().map(nearest).collect(),
+            Some(Surface::Local(metric, values)) => {
+                let local = |place: &Vec<f64>| {
+                    let around = self.around(place, AROUND);
+                    let points: Vec<Vec<f64>> = around.iter().map(|k| self.points[*k].clone()).collect();
+                    let values: Vec<Vec<f64>> = around.iter().map(|k| values[*k].clone()).collect();
+                    let function = Interpolation::fit(metric.clone(), &points, &values);
+                    function.map_or_else(|| nearest(place), |function| function.at(place))
+                };
+                places.par_iter().map(local).collect()
+            }
+            Some(Surface::Nearest) | None => places.iter().map(nearest).collect(),
         }
+    }
+
+    /// The places of the points nearest to another, nearest first.
+    fn around(&self, place: &[f64], count: usize) -> Vec<usize> {
+        let squared = |k: usize| self.points[k].iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let mut order: Vec<(f64, usize)> = (0..self.points.len()).map(|k| (squared(k), k)).collect();
+        let count = count.min(order.len());
+        let by_distance = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if count < order.len() {
+            order.select_nth_unstable_by(count, by_distance);
+        }
+        order.truncate(count);
+        order.sort_by(by_distance);
+        order.into_iter().map(|(_, k)| k).collect()
     }
 }
 
