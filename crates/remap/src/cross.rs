@@ -436,11 +436,7 @@ impl Look {
 /// What noise makes of a mean of two halves.
 fn noise(takes: &Takes) -> Option<Image> {
     let [first, second] = &takes.halves[..] else { return None };
-    let mut noise = first.clone();
-    for (out, other) in noise.pixels_mut().iter_mut().zip(second.pixels()) {
-        (0..3).for_each(|c| out[c] = (out[c] - other[c]) / 2.0);
-    }
-    Some(noise)
+    Some(first.zipped(second, |a, b| (a - b) / 2.0))
 }
 
 impl CrossStage {
