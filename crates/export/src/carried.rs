@@ -4,8 +4,8 @@ use crate::ExportError;
 use crate::function::Function;
 use crate::question::{Answer, Point, Question, grid};
 
-/// Largest error of a table between its points, in the parameter's unit: a fifth of what exports may be off.
-const TOLERANCE: f64 = 2e-4;
+/// Largest error of a table between its points, in the parameter's unit: half of what exports may be off.
+const TOLERANCE: f64 = 5e-4;
 /// Points after which a table is fine enough.
 const MAX_POINTS: usize = 8_000;
 

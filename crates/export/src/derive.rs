@@ -69,7 +69,7 @@ impl Mapping {
                     levels.remove(input);
                     notes.push(format!(
                         "'{parameter}' depends on '{name}' in a way that no formula here has: '{name}' is fixed at \
-                         {r},{g},{b}; choose another value with --fix {name}=VALUE"
+                         {r}/{g}/{b}; choose another value with --fix {name}=VALUE"
                     ));
                 }
                 Outcome::Unused(unused) => {
@@ -94,7 +94,10 @@ impl Mapping {
             }
         }
         for output in self.outputs.iter().filter(|o| o.error > PROMISED) {
-            self.notes.push(format!("'{}' is off by up to {:.1e} from what apply gives", output.name, output.error));
+            self.notes.push(format!(
+                "'{}' is off by up to {:.1e} from what apply gives",
+                output.name, output.error
+            ));
         }
         Ok(())
     }
@@ -246,7 +249,9 @@ impl Derivation<'_> {
         let known: Vec<(&Point, &Vec<Vec<f64>>)> =
             points.iter().zip(&answers).filter_map(|(p, a)| Some((p, a.as_ref()?))).collect();
         if known.is_empty() {
-            return Err(ExportError::Request("the probe has no result nearly everywhere; remap again".into()));
+            return Err(ExportError::Request(
+                "the probe has no result nearly everywhere; remap again".into(),
+            ));
         }
         let mut outputs = Vec::new();
         for (index, parameter) in question.probe.to.model().parameters.iter().enumerate() {

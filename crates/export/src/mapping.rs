@@ -131,14 +131,35 @@ pub(crate) fn hue(colour: [f64; 3]) -> [f64; 3] {
 
 /// Words of the languages that are written, which no parameter may be called.
 const RESERVED: [&str; 24] = [
-    "and", "as", "class", "clamp", "color", "def", "displacement", "exp", "float", "in", "int", "is", "lambda",
-    "log", "matrix", "mix", "normal", "or", "out", "output", "point", "result", "surface", "vector",
+    "and",
+    "as",
+    "class",
+    "clamp",
+    "color",
+    "def",
+    "displacement",
+    "exp",
+    "float",
+    "in",
+    "int",
+    "is",
+    "lambda",
+    "log",
+    "matrix",
+    "mix",
+    "normal",
+    "or",
+    "out",
+    "output",
+    "point",
+    "result",
+    "surface",
+    "vector",
 ];
 
 /// A name as all languages accept it.
 pub(crate) fn identifier(name: &str) -> String {
-    let mut text: String =
-        name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let mut text: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     // Two underscores in a row are reserved in GLSL.
     while text.contains("__") {
         text = text.replace("__", "_");

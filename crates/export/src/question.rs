@@ -59,7 +59,8 @@ impl<'a> Question<'a> {
         let share = |n: usize, d: usize| (0.5 + n as f64 * root.powi(-(d as i32 + 1))).fract();
         let coordinate = |n: usize, i: usize| {
             let [min, max] = self.inputs[i].range;
-            let at = |c: usize| min + share(n, 3 * i + if self.inputs[i].is_colour { c } else { 0 }) * (max - min);
+            let at =
+                |c: usize| min + share(n, 3 * i + if self.inputs[i].is_colour { c } else { 0 }) * (max - min);
             std::array::from_fn(at)
         };
         (0..count).map(|n| (0..self.inputs.len()).map(|i| coordinate(n + 1, i)).collect()).collect()

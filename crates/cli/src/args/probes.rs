@@ -123,5 +123,9 @@ pub(crate) struct ExportArgs {
 }
 
 fn export_formats() -> PossibleValuesParser {
-    formats().iter().map(|format| PossibleValue::new(format.name()).help(format.summary())).collect::<Vec<_>>().into()
+    formats()
+        .iter()
+        .map(|format| PossibleValue::new(format.name()).help(format.summary()))
+        .collect::<Vec<_>>()
+        .into()
 }

@@ -23,7 +23,12 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<()> {
         fix: args.fix.iter().map(|text| assignment(text)).collect::<Result<_, _>>()?,
         title: args.probe.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
-    let exported = format.export(&probe, &options)?;
+    // Where the colour of a body is matched, each of thousands of points is some integrals over the hemisphere.
+    let progress = indicatif::ProgressBar::new_spinner().with_message("asking the probe");
+    progress.enable_steady_tick(std::time::Duration::from_millis(200));
+    let exported = format.export(&probe, &options);
+    progress.finish_and_clear();
+    let exported = exported?;
     let files: Vec<(PathBuf, &File)> =
         exported.files.iter().map(|file| (suffixed(&args.output, &file.suffix), file)).collect();
     for (path, _) in &files {
@@ -64,9 +69,14 @@ fn suffixed(path: &Path, suffix: &str) -> PathBuf {
 
 fn text(paths: &[&PathBuf], exported: &Exported) -> String {
     let mut text: String = paths.iter().map(|path| format!("{}\n", path.display())).collect();
-    text += &format!("takes {}\n", if exported.inputs.is_empty() { "nothing".into() } else { exported.inputs.join(", ") });
+    text += &format!(
+        "takes {}\n",
+        if exported.inputs.is_empty() { "nothing".into() } else { exported.inputs.join(", ") }
+    );
     let mut rows = vec![vec!["gives".to_owned(), "largest difference from apply".to_owned()]];
-    let error = |error: &Option<f64>| error.map_or("-".into(), |e| if e < 1e-9 { "none".into() } else { format!("{e:.1e}") });
+    let error = |error: &Option<f64>| {
+        error.map_or("-".into(), |e| if e < 1e-9 { "none".into() } else { format!("{e:.1e}") })
+    };
     rows.extend(exported.outputs.iter().map(|(name, e)| vec![name.clone(), error(e)]));
     text + &table(&rows)
 }

@@ -41,7 +41,10 @@ fn names(mapping: &Mapping, function: &Function) -> (String, Vec<String>) {
 pub(crate) fn code(mapping: &Mapping, function: &Function) -> Code {
     let (name, arguments) = names(mapping, function);
     let mut code = Code {
-        signature: format!("float {name}({})", arguments.iter().map(|a| format!("float {a}")).collect::<Vec<_>>().join(", ")),
+        signature: format!(
+            "float {name}({})",
+            arguments.iter().map(|a| format!("float {a}")).collect::<Vec<_>>().join(", ")
+        ),
         arrays: Vec::new(),
         body: String::new(),
     };
@@ -57,7 +60,9 @@ pub(crate) fn code(mapping: &Mapping, function: &Function) -> Code {
     }
     let prefix = name.to_uppercase();
     let value = match &function.shape {
-        Shape::Table { levels, values, nearest } => code.table(&prefix, (levels, values, *nearest), (&places, &arguments)),
+        Shape::Table { levels, values, nearest } => {
+            code.table(&prefix, (levels, values, *nearest), (&places, &arguments))
+        }
         Shape::Polynomial { terms } => {
             let product = |t: &lookmatch_remap::Term| {
                 let powers = t.powers.iter().zip(&places).flat_map(|(n, u)| vec![u.clone(); *n as usize]);
@@ -108,9 +113,17 @@ impl Code {
         for ((levels, place), name) in levels.iter().zip(places).zip(names) {
             self.place(&format!("{prefix}_{}_LEVELS", name.to_uppercase()), levels, (place, name));
             if nearest {
-                writeln!(self.body, "    if (t_{name} > 0.5) {{ t_{name} = 1.0; }} else {{ t_{name} = 0.0; }}").ok();
+                writeln!(
+                    self.body,
+                    "    if (t_{name} > 0.5) {{ t_{name} = 1.0; }} else {{ t_{name} = 0.0; }}"
+                )
+                .ok();
             }
-            index = if index == "0" { format!("i_{name}") } else { format!("({index}) * {} + i_{name}", levels.len()) };
+            index = if index == "0" {
+                format!("i_{name}")
+            } else {
+                format!("({index}) * {} + i_{name}", levels.len())
+            };
         }
         writeln!(self.body, "    int first = {index};").ok();
         let table = format!("{prefix}_VALUES");
@@ -131,12 +144,20 @@ impl Code {
     }
 
     /// The value at a knot and a cubic of the share of the interval.
-    fn spline(&mut self, prefix: &str, (knots, values, slopes): (&[f64], &[f64], &[f64]), place: &str) -> String {
+    fn spline(
+        &mut self,
+        prefix: &str,
+        (knots, values, slopes): (&[f64], &[f64], &[f64]),
+        place: &str,
+    ) -> String {
         self.place(&format!("{prefix}_KNOTS"), knots, (place, "knot"));
         let intervals = knots.len() - 1;
         let coefficient = |n: usize| (0..intervals).map(|k| cubic(knots, values, slopes, k)[n]).collect();
         self.arrays.push((format!("{prefix}_VALUES"), values[..intervals].to_vec()));
-        ["A", "B", "C"].iter().enumerate().for_each(|(n, c)| self.arrays.push((format!("{prefix}_{c}"), coefficient(n))));
+        ["A", "B", "C"]
+            .iter()
+            .enumerate()
+            .for_each(|(n, c)| self.arrays.push((format!("{prefix}_{c}"), coefficient(n))));
         let read = |c: &str| format!("{prefix}_{c}[i_knot]");
         let [value, a, b, c] = ["VALUES", "A", "B", "C"].map(read);
         format!("{value} + t_knot * ({a} + t_knot * ({b} + t_knot * {c}))")

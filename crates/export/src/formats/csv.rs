@@ -24,7 +24,8 @@ impl Format for Csv {
             return Err(ExportError::Request(what.into()));
         }
         let mut writer = Writer::from_writer(Vec::new());
-        let failed = |error: &dyn std::fmt::Display| ExportError::Request(format!("cannot write the table: {error}"));
+        let failed =
+            |error: &dyn std::fmt::Display| ExportError::Request(format!("cannot write the table: {error}"));
         writer.write_record(header(probe)).map_err(|e| failed(&e))?;
         for (place, entry) in probe.entries.iter().enumerate() {
             writer.write_record(row(probe, place, entry)).map_err(|e| failed(&e))?;
@@ -54,11 +55,14 @@ const MEASURES: [&str; 8] = [
 ];
 
 fn header(probe: &Probe) -> Vec<String> {
-    let columns = |side: &str, axes: &[Axis]| axes.iter().map(|a| format!("{side}.{}", a.name)).collect::<Vec<_>>();
+    let columns =
+        |side: &str, axes: &[Axis]| axes.iter().map(|a| format!("{side}.{}", a.name)).collect::<Vec<_>>();
     let mut header = columns("source", &probe.source_axes);
     header.extend(columns("target", &probe.target_axes));
     header.extend(MEASURES.map(str::to_owned));
-    header.extend(["body_r", "body_g", "body_b", "evaluations", "saturated", "flags", "failed"].map(str::to_owned));
+    header.extend(
+        ["body_r", "body_g", "body_b", "evaluations", "saturated", "flags", "failed"].map(str::to_owned),
+    );
     header
 }
 
@@ -67,7 +71,9 @@ fn row(probe: &Probe, place: usize, entry: &Entry) -> Vec<String> {
     // Of what failed nothing is known.
     let known = |v: f64| if has_result { v.to_string() } else { String::new() };
     let mut row: Vec<String> = entry.source.iter().map(f64::to_string).collect();
-    row.extend((0..probe.target_axes.len()).map(|k| entry.target.get(k).map_or(String::new(), f64::to_string)));
+    row.extend(
+        (0..probe.target_axes.len()).map(|k| entry.target.get(k).map_or(String::new(), f64::to_string)),
+    );
     row.push(known(entry.fitness));
     row.extend(entry.nrmsd.iter().chain(&entry.nrmsd_masked).map(|v| known(*v)));
     row.push(entry.noise.map_or(String::new(), |noise| noise.fitness.to_string()));

@@ -50,11 +50,18 @@ fn text(mapping: &Mapping) -> String {
     }
     let hues = hues(mapping);
     if !hues.is_empty() {
-        writeln!(text, "\n// A colour divided by its largest channel; white for black.\nvec3 {name}_hue(vec3 c)\n{{").ok();
-        text += "    float largest = max(c.x, max(c.y, c.z));\n";
-        text += "    if (largest > 0.0) { return c / largest; }\n    return vec3(1.0);\n}\n";
+        writeln!(
+            text,
+            "\n// A colour divided by its largest channel; white for black.\nvec3 {name}_hue(vec3 c)\n{{"
+        )
+        .ok();
+        text += "    float largest = max(c[0], max(c[1], c[2]));\n";
+        text += "    if (largest > 0.0) { return c / largest; }\n    return vec3(1.0, 1.0, 1.0);\n}\n";
     }
-    let inputs = mapping.inputs.iter().map(|i| format!("{} {}", kind(1 + 2 * usize::from(i.is_colour)), identifier(&i.name)));
+    let inputs = mapping
+        .inputs
+        .iter()
+        .map(|i| format!("{} {}", kind(1 + 2 * usize::from(i.is_colour)), identifier(&i.name)));
     writeln!(text, "\n{structure} {name}({})\n{{", inputs.collect::<Vec<_>>().join(", ")).ok();
     writeln!(text, "    {structure} result;").ok();
     for hue in hues {

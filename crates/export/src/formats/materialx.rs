@@ -29,11 +29,8 @@ impl Format for MaterialX {
     }
 
     fn export(&self, probe: &Probe, options: &Options) -> Result<Exported, ExportError> {
-        let mut mapping = Mapping::new(probe, options)?;
+        let mapping = Mapping::new(probe, options)?;
         let shader = SHADERS.iter().find(|shader| shader.model == mapping.to);
-        if let Some(shader) = shader {
-            mapping.notes.extend(shader.missing(&mapping));
-        }
         let text = document(&mapping, shader);
         let ports = mapping.ports();
         let mut exported = Exported::of(mapping, text);
@@ -48,29 +45,50 @@ struct Shader {
     node: &'static str,
     /// Parameters that have another name there; others have the same.
     renamed: &'static [(&'static str, &'static str)],
-    /// Parameters that the shader lacks.
-    absent: &'static [&'static str],
+    /// A choice of ours that is a number there: its name, the option that is 1 there, the shader's input.
+    switch: Option<[&'static str; 3]>,
 }
 
 const SHADERS: [Shader; 4] = [
-    Shader { model: "standard-surface", node: "standard_surface", renamed: &[], absent: &[] },
-    Shader { model: "openpbr", node: "open_pbr_surface", renamed: &[], absent: &[] },
-    Shader { model: "usd-preview-surface", node: "UsdPreviewSurface", renamed: &[], absent: &[] },
-    Shader { model: "gltf", node: "gltf_pbr", renamed: &[], absent: &[] },
+    Shader { model: "standard-surface", node: "standard_surface", renamed: &[], switch: None },
+    Shader { model: "openpbr", node: "open_pbr_surface", renamed: &[], switch: None },
+    Shader {
+        model: "usd-preview-surface",
+        node: "UsdPreviewSurface",
+        renamed: &[
+            ("diffuse_color", "diffuseColor"),
+            ("specular_color", "specularColor"),
+            ("clearcoat_roughness", "clearcoatRoughness"),
+        ],
+        switch: Some(["use_specular_workflow", "1", "useSpecularWorkflow"]),
+    },
+    Shader { model: "gltf", node: "gltf_pbr", renamed: &[], switch: None },
 ];
 
 impl Shader {
-    fn input(&self, parameter: &str) -> Option<String> {
-        if self.absent.contains(&parameter) {
-            return None;
-        }
-        let renamed = self.renamed.iter().find(|(ours, _)| *ours == parameter);
-        Some(renamed.map_or(parameter, |(_, theirs)| theirs).to_owned())
+    fn input<'a>(&self, parameter: &'a str) -> &'a str {
+        self.renamed.iter().find(|(ours, _)| *ours == parameter).map_or(parameter, |(_, theirs)| theirs)
     }
 
-    fn missing(&self, mapping: &Mapping) -> Vec<String> {
-        let absent = mapping.outputs.iter().filter(|o| self.input(&o.name).is_none());
-        absent.map(|o| format!("the shader {} has no '{}': the material leaves it out", self.node, o.name)).collect()
+    /// The shader with its inputs from the node `probe`, and a material that uses it.
+    fn material(&self, mapping: &Mapping) -> [Element; 2] {
+        let mut surface = Element::new(self.node, &[("name", "surface"), ("type", "surfaceshader")]);
+        for (output, port) in mapping.outputs.iter().zip(mapping.ports()) {
+            let (name, kind) = (self.input(&output.name), kind(output.channels.len() == 3));
+            let attributes = [("name", name), ("type", kind), ("nodename", "probe"), ("output", &port)];
+            surface.children.push(Element::new("input", &attributes));
+        }
+        if let Some([ours, on, theirs]) = self.switch {
+            let is_on = mapping.choices.iter().any(|[name, value]| name == ours && value == on);
+            let attributes =
+                [("name", theirs), ("type", "integer"), ("value", if is_on { "1" } else { "0" })];
+            surface.children.push(Element::new("input", &attributes));
+        }
+        let name = format!("{}_material", mapping.name());
+        let mut material = Element::new("surfacematerial", &[("name", &name), ("type", "material")]);
+        let attributes = [("name", "surfaceshader"), ("type", "surfaceshader"), ("nodename", "surface")];
+        material.children.push(Element::new("input", &attributes));
+        [surface, material]
     }
 }
 
@@ -86,38 +104,38 @@ fn number(value: f64) -> String {
 fn document(mapping: &Mapping, shader: Option<&Shader>) -> String {
     let name = mapping.name();
     let mut root = Element::new("materialx", &[("version", "1.39")]);
-    let definition = [("name", format!("ND_{name}")), ("node", name.clone()), ("nodegroup", "material".into())];
+    let definition =
+        [("name", format!("ND_{name}")), ("node", name.clone()), ("nodegroup", "material".into())];
     let mut definition = Element::named("nodedef", &definition);
     for input in &mapping.inputs {
         definition.children.push(port(input));
     }
     for (output, port) in mapping.outputs.iter().zip(mapping.ports()) {
-        let attributes = [("name", port), ("type", kind(output.channels.len() == 3).into()), ("doc", output.title.clone())];
+        let attributes = [
+            ("name", port),
+            ("type", kind(output.channels.len() == 3).into()),
+            ("doc", output.title.clone()),
+        ];
         definition.children.push(Element::named("output", &attributes));
     }
     root.children.push(definition);
     root.children.push(implementation(mapping, &name));
     let values = |input: &Input| {
-        let value = if input.is_colour { input.default.map(number).join(", ") } else { number(input.default[0]) };
+        let value =
+            if input.is_colour { input.default.map(number).join(", ") } else { number(input.default[0]) };
         let kind = kind(input.is_colour);
         Element::named("input", &[("name", identifier(&input.name)), ("type", kind.into()), ("value", value)])
     };
     if let Some(shader) = shader {
-        let mut instance = Element::new(&name, &[("name", "probe"), ("type", "multioutput")]);
+        // With a single output, a node has its type.
+        let kind = match &mapping.outputs[..] {
+            [only] => kind(only.channels.len() == 3),
+            _ => "multioutput",
+        };
+        let mut instance = Element::new(&name, &[("name", "probe"), ("type", kind)]);
         instance.children = mapping.inputs.iter().map(values).collect();
         root.children.push(instance);
-        let mut surface = Element::new(shader.node, &[("name", "surface"), ("type", "surfaceshader")]);
-        for (output, port) in mapping.outputs.iter().zip(mapping.ports()) {
-            let Some(input) = shader.input(&output.name) else { continue };
-            let kind = kind(output.channels.len() == 3);
-            let attributes = [("name", &input[..]), ("type", kind), ("nodename", "probe"), ("output", &port)];
-            surface.children.push(Element::new("input", &attributes));
-        }
-        root.children.push(surface);
-        let mut material = Element::named("surfacematerial", &[("name", format!("{name}_material")), ("type", "material".into())]);
-        let attributes = [("name", "surfaceshader"), ("type", "surfaceshader"), ("nodename", "surface")];
-        material.children.push(Element::new("input", &attributes));
-        root.children.push(material);
+        root.children.extend(shader.material(mapping));
     }
     let mut head = mapping.header.clone();
     head.push("Values outside the range are moved to its nearest end.".into());
@@ -168,25 +186,37 @@ struct Writer<'a> {
 impl Writer<'_> {
     /// The node that gives an output.
     fn output(&mut self, output: &Output) -> String {
-        let name = format!("{}_value", identifier(&output.name));
+        let name = identifier(&output.name);
+        if let Some(node) = self.constant(output, &name) {
+            return node;
+        }
         let first = output.channels[0];
         let is_grey = output.channels.iter().all(|c| *c == first) && !self.differs(&first);
-        let channels: Vec<String> = if is_grey {
-            vec![self.channel(output, 0)]
-        } else {
-            (0..output.channels.len()).map(|c| self.channel(output, c)).collect()
-        };
-        let node = |c: usize| Arg::node(&channels[if is_grey { 0 } else { c }]);
+        let count = if is_grey { 1 } else { output.channels.len() };
+        let channels: Vec<String> = (0..count).map(|c| self.channel(output, c)).collect();
         if output.channels.len() == 1 {
-            return self.graph.add("dot", "float", &name, &[("in", "float", node(0))]);
+            return channels[0].clone();
         }
+        let node = |c: usize| Arg::node(&channels[c % count]);
         let inputs = [("in1", "float", node(0)), ("in2", "float", node(1)), ("in3", "float", node(2))];
-        self.graph.add("combine3", "color3", &name, &inputs)
+        self.graph.add("combine3", "color3", &format!("{name}_channels"), &inputs)
+    }
+
+    fn constant(&mut self, output: &Output, name: &str) -> Option<String> {
+        let value = |formula: &Formula| match (formula.function, formula.factor) {
+            (None, Factor::Constant(value)) => Some(number(value)),
+            _ => None,
+        };
+        let values: Vec<String> = output.channels.iter().map(value).collect::<Option<_>>()?;
+        let kind = kind(output.channels.len() == 3);
+        let inputs = [("value", kind, Arg::value(values.join(", ")))];
+        Some(self.graph.add_anew("constant", kind, &format!("{name}_constant"), &inputs))
     }
 
     /// Whether a formula gives each channel another value.
     fn differs(&self, formula: &Formula) -> bool {
-        let by_function = formula.function.is_some_and(|f| self.mapping.by_channel(&self.mapping.functions[f]));
+        let by_function =
+            formula.function.is_some_and(|f| self.mapping.by_channel(&self.mapping.functions[f]));
         let by_factor = match formula.factor {
             Factor::Constant(_) => false,
             Factor::Input(i) | Factor::Hue(i) => self.mapping.inputs[i].is_colour,
@@ -197,7 +227,11 @@ impl Writer<'_> {
     /// The node that gives a channel of an output.
     fn channel(&mut self, output: &Output, c: usize) -> String {
         let formula = output.channels[c];
-        let name = if output.channels.len() == 3 { format!("{}_{}", output.name, ["r", "g", "b"][c]) } else { output.name.clone() };
+        let name = if output.channels.len() == 3 {
+            format!("{}_{}", output.name, ["r", "g", "b"][c])
+        } else {
+            output.name.clone()
+        };
         let name = identifier(&name);
         let gain = formula.function.map(|f| self.function(&self.mapping.functions[f], c));
         let factor = match formula.factor {
@@ -212,7 +246,6 @@ impl Writer<'_> {
                 Arg::node(&self.graph.add("multiply", "float", &format!("{name}_product"), &inputs))
             }
             (Some(gain), None) => return gain,
-            (None, Some(value @ Arg::Value(_))) => return self.graph.add("constant", "float", &name, &[("value", "float", value)]),
             (None, Some(factor)) => factor,
             (None, None) => Arg::value("1".into()),
         };
@@ -221,7 +254,12 @@ impl Writer<'_> {
 
     fn clamp(&mut self, value: Arg, [low, high]: [f64; 2], name: &str) -> String {
         let limit = |v: f64| Arg::value(number(v));
-        self.graph.add("clamp", "float", name, &[("in", "float", value), ("low", "float", limit(low)), ("high", "float", limit(high))])
+        self.graph.add(
+            "clamp",
+            "float",
+            name,
+            &[("in", "float", value), ("low", "float", limit(low)), ("high", "float", limit(high))],
+        )
     }
 
     /// A channel of an input, within its range.
@@ -232,7 +270,7 @@ impl Writer<'_> {
         if !input.is_colour {
             return self.clamp(interface, input.range, &format!("{name}_in_range"));
         }
-        let channels = format!("{name}_channels");
+        let channels = format!("{name}_separated");
         let separate = self.graph.add("separate3", "multioutput", &channels, &[("in", "color3", interface)]);
         let (channel, suffix) = (["outr", "outg", "outb"][c], ["r", "g", "b"][c]);
         self.clamp(Arg::Node(separate, Some(channel)), input.range, &format!("{name}_{suffix}_in_range"))
@@ -243,7 +281,12 @@ impl Writer<'_> {
         let name = identifier(&self.mapping.inputs[i].name);
         let [r, g, b] = [0, 1, 2].map(|c| Arg::node(&self.input(i, c)));
         let channel = [&r, &g, &b][c].clone();
-        let larger = self.graph.add("max", "float", &format!("{name}_larger"), &[("in1", "float", r), ("in2", "float", g)]);
+        let larger = self.graph.add(
+            "max",
+            "float",
+            &format!("{name}_larger"),
+            &[("in1", "float", r), ("in2", "float", g)],
+        );
         let largest = [("in1", "float", Arg::node(&larger)), ("in2", "float", b)];
         let largest = self.graph.add("max", "float", &format!("{name}_largest"), &largest);
         // Both branches may be computed, and nothing be divided by zero.
@@ -263,7 +306,11 @@ impl Writer<'_> {
 
     /// The node that gives a function, for a channel of coloured inputs.
     fn function(&mut self, function: &Function, c: usize) -> String {
-        let suffix = if self.mapping.by_channel(function) { format!("_{}", ["r", "g", "b"][c]) } else { String::new() };
+        let suffix = if self.mapping.by_channel(function) {
+            format!("_{}", ["r", "g", "b"][c])
+        } else {
+            String::new()
+        };
         let name = format!("{}_function{suffix}", identifier(&function.name));
         let mut places = Vec::new();
         for argument in &function.arguments {
@@ -274,16 +321,22 @@ impl Writer<'_> {
             });
         }
         let value = match &function.shape {
-            Shape::Table { levels, values, nearest } => self.graph.table(&name, &places, levels, values, *nearest),
+            Shape::Table { levels, values, nearest } => {
+                self.graph.table(&name, &places, levels, values, *nearest)
+            }
             Shape::Polynomial { terms } => self.polynomial(&name, terms, &places),
-            Shape::Spline { knots, values, slopes } => self.spline(&name, (knots, values, slopes), &places[0]),
+            Shape::Spline { knots, values, slopes } => {
+                self.spline(&name, (knots, values, slopes), &places[0])
+            }
         };
         let value = if function.logarithmic {
             self.graph.add("exp", "float", &format!("{name}_exp"), &[("in", "float", Arg::node(&value))])
         } else {
             value
         };
-        function.range.map_or(value.clone(), |range| self.clamp(Arg::node(&value), range, &format!("{name}_in_range")))
+        function
+            .range
+            .map_or(value.clone(), |range| self.clamp(Arg::node(&value), range, &format!("{name}_in_range")))
     }
 
     fn normalised(&mut self, value: &str, scale: Scale) -> String {
@@ -322,7 +375,11 @@ impl Writer<'_> {
                 let power = (2..=*power).fold(place.clone(), |lower, n| {
                     self.multiply(&format!("{place}_power_{n}"), Arg::node(&lower), Arg::node(place))
                 });
-                product = Arg::node(&self.multiply(&format!("{name}_term_{t}_{}", identifier(place)), Arg::node(&power), product));
+                product = Arg::node(&self.multiply(
+                    &format!("{name}_term_{t}_{}", identifier(place)),
+                    Arg::node(&power),
+                    product,
+                ));
             }
             sum = Some(match sum {
                 Some(sum) => self.sum(&format!("{name}_sum_{t}"), Arg::node(&sum), product),
@@ -333,13 +390,22 @@ impl Writer<'_> {
     }
 
     /// The value at the first knot, and for each interval the rise over as much of it as lies below the place.
-    fn spline(&mut self, name: &str, (knots, values, slopes): (&[f64], &[f64], &[f64]), place: &str) -> String {
+    fn spline(
+        &mut self,
+        name: &str,
+        (knots, values, slopes): (&[f64], &[f64], &[f64]),
+        place: &str,
+    ) -> String {
         let mut value = Arg::value(number(values[0]));
         let mut node = String::new();
         for k in 0..knots.len() - 1 {
             let [a, b, c] = cubic(knots, values, slopes, k).map(|v| Arg::value(number(v)));
             let limit = |v: f64| Arg::value(number(v));
-            let line = [("in", "float", Arg::node(place)), ("inlow", "float", limit(knots[k])), ("inhigh", "float", limit(knots[k + 1]))];
+            let line = [
+                ("in", "float", Arg::node(place)),
+                ("inlow", "float", limit(knots[k])),
+                ("inhigh", "float", limit(knots[k + 1])),
+            ];
             let line = self.graph.add("remap", "float", &format!("{name}_{k}_line"), &line);
             let t = self.clamp(Arg::node(&line), [0.0, 1.0], &format!("{name}_{k}_share"));
             let mut step = |prefix: &str, left: Arg, summand: Option<Arg>| {

@@ -72,11 +72,21 @@ impl Exported {
 /// What the head of every file says: what it is, of what, what goes in and what comes out.
 pub(crate) fn head(probe: &Probe, mapping: &Mapping, base: &Material, options: &Options) -> Vec<String> {
     let (from, to) = (probe.from.model(), probe.to.model());
-    let form = if options.smooth { "its fit (apply --smooth)" } else { "its table (apply)" };
+    let form = if options.smooth { "the fit of" } else { "the table of" };
+    let command = if options.smooth { "apply --smooth" } else { "apply" };
     let mut lines = vec![
-        format!("{}: the parameters of {} that look most like a material of {}.", mapping.name(), to.title, from.title),
+        format!(
+            "{}: the parameters of {} that look most like a material of {}.",
+            mapping.name(),
+            to.title,
+            from.title
+        ),
         String::new(),
-        format!("Written by lookmatch {} from {form}: {}", env!("CARGO_PKG_VERSION"), options.title),
+        format!(
+            "From {form} {} by lookmatch {}; gives what its '{command}' gives.",
+            options.title,
+            env!("CARGO_PKG_VERSION")
+        ),
         format!("Source: {base}"),
         format!("Target: {}", probe.to),
         format!("Mean fitness of its {} entries: {:.3}", probe.entries.len(), mean_fitness(probe)),

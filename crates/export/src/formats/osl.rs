@@ -36,7 +36,8 @@ fn text(mapping: &Mapping) -> String {
         let code = code(mapping, function);
         writeln!(text, "\n{}\n{{", code.signature).ok();
         for (array, values) in &code.arrays {
-            writeln!(text, "    float {array}[{}] = {{{}}};", values.len(), rows(values, number, "        ")).ok();
+            writeln!(text, "    float {array}[{}] = {{{}}};", values.len(), rows(values, number, "        "))
+                .ok();
         }
         text = text + &code.body + "}\n";
     }

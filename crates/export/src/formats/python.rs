@@ -110,9 +110,20 @@ fn definition(mapping: &Mapping, function: &Function) -> String {
         }
         Shape::Polynomial { terms } => {
             let terms: Vec<String> = (terms.iter())
-                .map(|t| format!("    ({}, ({})),", number(t.coefficient), t.powers.iter().map(|n| format!("{n},")).collect::<String>()))
+                .map(|t| {
+                    format!(
+                        "    ({}, ({})),",
+                        number(t.coefficient),
+                        t.powers.iter().map(|n| format!("{n},")).collect::<String>()
+                    )
+                })
                 .collect();
-            writeln!(text, "# Coefficients, and the powers of the arguments.\n_{constant}_TERMS = (\n{}\n)", terms.join("\n")).ok();
+            writeln!(
+                text,
+                "# Coefficients, and the powers of the arguments.\n_{constant}_TERMS = (\n{}\n)",
+                terms.join("\n")
+            )
+            .ok();
             format!("_polynomial(_{constant}_TERMS, ({places}))")
         }
         Shape::Spline { knots, values, slopes } => {
@@ -122,7 +133,12 @@ fn definition(mapping: &Mapping, function: &Function) -> String {
             };
             let pieces: Vec<String> = (0..knots.len() - 1).map(piece).collect();
             writeln!(text, "_{constant}_KNOTS = {}", tuple(knots)).ok();
-            writeln!(text, "# Between knots: powers 0 to 3 of the share of the interval.\n_{constant}_PIECES = (\n{}\n)", pieces.join("\n")).ok();
+            writeln!(
+                text,
+                "# Between knots: powers 0 to 3 of the share of the interval.\n_{constant}_PIECES = (\n{}\n)",
+                pieces.join("\n")
+            )
+            .ok();
             format!("_spline(_{constant}_KNOTS, _{constant}_PIECES, {})", places.trim_end_matches(','))
         }
     };

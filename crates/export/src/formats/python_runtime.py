@@ -44,6 +44,8 @@ def _checked(name, value, clamp):
         values = tuple(value) if isinstance(value, (tuple, list)) else (value,) * 3
         if len(values) != 3:
             raise ValueError(f"{name} has {len(values)} channels, expected one or three")
+    elif isinstance(value, (tuple, list)):
+        raise ValueError(f"{name} is one number, not {len(value)}")
     else:
         values = (value,)
     slack = 1e-9 * max(high - low, abs(low))
@@ -55,20 +57,22 @@ def _checked(name, value, clamp):
 
 
 def _main(function):
+    takes = " ".join(f"{n}=" + ("/".join(map(str, d)) if d else f"{low}...{high}") for n, (low, high, d) in INPUTS.items())
     arguments = [a for a in sys.argv[1:] if a != "--clamp"]
-    takes = " ".join(f"{n}={d or ''}".replace(" ", "").strip("()") if d is None else
-                     f"{n}={','.join(map(str, d))}" for n, (_, _, d) in INPUTS.items())
     if "-h" in arguments or "--help" in arguments:
-        print(f"usage: {sys.argv[0]} NAME=VALUE... [--clamp]\n{function.__doc__}\n{takes}")
+        print(f"usage: {sys.argv[0]} {takes} [--clamp]\n\n{function.__doc__}")
         return
     try:
-        pairs = dict(a.split("=", 1) for a in arguments)
-        values = {n: [float(x) for x in v.split(",")] for n, v in pairs.items()}
-        values = {n: v[0] if len(v) == 1 else v for n, v in values.items()}
-        unknown = [n for n in values if n not in INPUTS]
+        values = {}
+        for argument in arguments:
+            name, _, text = argument.partition("=")
+            if name not in INPUTS:
+                raise ValueError(f"'{name}' is unknown; give {takes}")
+            numbers = [float(v) for v in text.split("/")]
+            values[name] = numbers if len(numbers) > 1 else numbers[0]
         missing = [n for n, (_, _, default) in INPUTS.items() if default is None and n not in values]
-        if unknown or missing:
-            raise ValueError(f"give {takes}; missing: {missing}, unknown: {unknown}")
+        if missing:
+            raise ValueError(f"{' and '.join(missing)} missing; give {takes}")
         print(json.dumps(function(**values, clamp="--clamp" in sys.argv), indent=2))
     except ValueError as error:
         sys.exit(f"error: {error}")

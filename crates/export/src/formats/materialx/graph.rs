@@ -16,7 +16,8 @@ impl Element {
     }
 
     pub(super) fn new(tag: &str, attributes: &[(&'static str, &str)]) -> Self {
-        let attributes: Vec<(&'static str, String)> = attributes.iter().map(|(k, v)| (*k, (*v).to_owned())).collect();
+        let attributes: Vec<(&'static str, String)> =
+            attributes.iter().map(|(k, v)| (*k, (*v).to_owned())).collect();
         Self::named(tag, &attributes)
     }
 
@@ -39,7 +40,8 @@ impl Element {
         if self.children.is_empty() {
             return element.write_empty().map(|_| ());
         }
-        let inner = |writer: &mut quick_xml::Writer<Vec<u8>>| self.children.iter().try_for_each(|c| c.write(writer));
+        let inner =
+            |writer: &mut quick_xml::Writer<Vec<u8>>| self.children.iter().try_for_each(|c| c.write(writer));
         element.write_inner_content(inner).map(|_| ())
     }
 }
@@ -73,15 +75,44 @@ pub(super) struct Graph {
 
 impl Graph {
     /// Adds a node and returns its name. A node that is there already is used again.
-    pub(super) fn add(&mut self, category: &str, kind: &str, name: &str, inputs: &[(&'static str, &str, Arg)]) -> String {
+    pub(super) fn add(
+        &mut self,
+        category: &str,
+        kind: &str,
+        name: &str,
+        inputs: &[(&'static str, &str, Arg)],
+    ) -> String {
+        let node = Self::node(category, kind, inputs);
+        let is_same = |other: &&Element| {
+            other.tag == node.tag
+                && other.attributes[1] == node.attributes[1]
+                && other.children == node.children
+        };
+        match self.nodes.iter().find(is_same) {
+            Some(same) => same.attributes[0].1.clone(),
+            None => self.push(node, name),
+        }
+    }
+
+    /// Adds a node of its own.
+    pub(super) fn add_anew(
+        &mut self,
+        category: &str,
+        kind: &str,
+        name: &str,
+        inputs: &[(&'static str, &str, Arg)],
+    ) -> String {
+        self.push(Self::node(category, kind, inputs), name)
+    }
+
+    fn node(category: &str, kind: &str, inputs: &[(&'static str, &str, Arg)]) -> Element {
         let mut node = Element::new(category, &[("name", ""), ("type", kind)]);
         node.children = inputs.iter().map(|(name, kind, arg)| input(name, kind, arg)).collect();
-        let is_same = |other: &&Element| {
-            other.tag == node.tag && other.attributes[1] == node.attributes[1] && other.children == node.children
-        };
-        if let Some(same) = self.nodes.iter().find(is_same) {
-            return same.attributes[0].1.clone();
-        }
+        node
+    }
+
+    /// Nodes are named once, and not like outputs.
+    fn push(&mut self, mut node: Element, name: &str) -> String {
         let is_taken = |name: &str| self.nodes.iter().any(|n| n.attributes[0].1 == name);
         let numbered = (2..).map(|n| format!("{name}_{n}"));
         let name = [name.to_owned()].into_iter().chain(numbered).find(|n| !is_taken(n)).unwrap_or_default();

@@ -32,7 +32,8 @@ impl Graph {
 
     /// Weights of the levels of an argument in fours, 0 beyond the last.
     fn weights(&mut self, place: &str, levels: &[f64], nearest: bool) -> Vec<String> {
-        let place4 = self.add("convert", "vector4", &format!("{place}_four"), &[("in", "float", Arg::node(place))]);
+        let place4 =
+            self.add("convert", "vector4", &format!("{place}_four"), &[("in", "float", Arg::node(place))]);
         let fours = levels.len().div_ceil(WIDTH);
         let mut weights = Vec::new();
         for group in 0..fours {
@@ -41,7 +42,11 @@ impl Graph {
             let [reached, passed] = [0, 1].map(|next| {
                 let first = WIDTH * group + next;
                 let name = format!("{name}_{}", ["reached", "passed"][next]);
-                if nearest { self.steps(&name, place, levels, first) } else { self.lines(&name, &place4, levels, first) }
+                if nearest {
+                    self.steps(&name, place, levels, first)
+                } else {
+                    self.lines(&name, &place4, levels, first)
+                }
             });
             let inputs = [("in1", "vector4", Arg::node(&reached)), ("in2", "vector4", Arg::node(&passed))];
             weights.push(self.add("subtract", "vector4", &name, &inputs));
@@ -59,7 +64,8 @@ impl Graph {
             _ => [last, last + 1.0],
         };
         let [low, high] = [0, 1].map(|side| vector(std::array::from_fn(|k| ends(k)[side])));
-        let inputs = [("in", "vector4", Arg::node(place4)), ("inlow", "vector4", low), ("inhigh", "vector4", high)];
+        let inputs =
+            [("in", "vector4", Arg::node(place4)), ("inlow", "vector4", low), ("inhigh", "vector4", high)];
         let line = self.add("remap", "vector4", &format!("{name}_line"), &inputs);
         self.add("clamp", "vector4", name, &[("in", "vector4", Arg::node(&line))])
     }
@@ -88,7 +94,13 @@ impl Graph {
     }
 
     /// The sum over all points of value times weights.
-    fn contracted(&mut self, name: &str, weights: &[Vec<String>], levels: &[Vec<f64>], values: &[f64]) -> String {
+    fn contracted(
+        &mut self,
+        name: &str,
+        weights: &[Vec<String>],
+        levels: &[Vec<f64>],
+        values: &[f64],
+    ) -> String {
         if let [columns] = weights {
             return self.row(name, columns, values);
         }
@@ -102,8 +114,14 @@ impl Graph {
                 }
                 let inputs: Vec<_> = (["in1", "in2", "in3", "in4"].into_iter().enumerate())
                     .map(|(k, input)| {
-                        let inner = rows.get(k).map(|row| self.contracted(&format!("{name}_{k}"), &weights[1..], &levels[1..], row));
-                        (input, "float", inner.map_or_else(|| Arg::value("0".into()), |node| Arg::node(&node)))
+                        let inner = rows.get(k).map(|row| {
+                            self.contracted(&format!("{name}_{k}"), &weights[1..], &levels[1..], row)
+                        });
+                        (
+                            input,
+                            "float",
+                            inner.map_or_else(|| Arg::value("0".into()), |node| Arg::node(&node)),
+                        )
                     })
                     .collect();
                 self.add("combine4", "vector4", &name, &inputs)
