@@ -16,9 +16,25 @@ pub(crate) fn rows(values: &[f64], number: fn(f64) -> String, indent: &str) -> S
     format!("\n{indent}{}", rows.collect::<Vec<_>>().join(&format!(",\n{indent}")))
 }
 
+/// Text for compilers that read nothing but ASCII.
+pub(crate) fn ascii(text: &str) -> String {
+    let spelled = text
+        .replace('α', "alpha")
+        .replace('√', "sqrt ")
+        .replace('−', "-")
+        .replace('η', "eta")
+        .replace('–', "-");
+    spelled.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect()
+}
+
 /// Comment lines.
 pub(crate) fn comment(lines: &[String], mark: &str) -> String {
     lines.iter().map(|line| format!("{mark} {line}").trim_end().to_owned() + "\n").collect()
+}
+
+/// The same in ASCII.
+pub(crate) fn ascii_comment(lines: &[String], mark: &str) -> String {
+    ascii(&comment(lines, mark))
 }
 
 /// A function in C.

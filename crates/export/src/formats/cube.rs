@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use lookmatch_remap::Probe;
 
-use super::code::comment;
+use super::code::ascii_comment;
 use super::{Exported, File, Format, Options};
 use crate::ExportError;
 use crate::function::Shape;
@@ -260,7 +260,7 @@ impl<'a> Table<'a> {
     }
 
     fn text(&self, mapping: &Mapping) -> String {
-        let mut text = comment(&mapping.header, "#") + &self.legend(mapping);
+        let mut text = ascii_comment(&mapping.header, "#") + &self.legend(mapping);
         let names: Vec<&str> = self.functions.iter().map(|f| mapping.functions[*f].name.as_str()).collect();
         writeln!(text, "TITLE \"{} to {}: {}\"", mapping.from, mapping.to, names.join(", ")).ok();
         let is_3d = self.inputs.len() > 1;

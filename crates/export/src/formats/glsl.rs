@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use lookmatch_remap::Probe;
 
-use super::code::{code, comment, expressions, hues, number, rows};
+use super::code::{ascii_comment, code, expressions, hues, number, rows};
 use super::{Exported, Format, Options};
 use crate::ExportError;
 use crate::mapping::{Mapping, identifier};
@@ -31,7 +31,7 @@ impl Format for Glsl {
 fn text(mapping: &Mapping) -> String {
     let name = mapping.name();
     let structure = format!("{}_parameters", identifier(&mapping.to));
-    let mut text = comment(&mapping.header, "//");
+    let mut text = ascii_comment(&mapping.header, "//");
     text += "// Values outside the range are moved to its nearest end.\n";
     text += "// Include it after #version 330, #version 300 es or later.\n";
     writeln!(text, "\nstruct {structure}\n{{").ok();

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use lookmatch_remap::Probe;
 
-use super::code::{code, comment, expressions, hues, number, rows};
+use super::code::{ascii, ascii_comment, code, expressions, hues, number, rows};
 use super::{Exported, Format, Options};
 use crate::ExportError;
 use crate::mapping::{Input, Mapping, identifier};
@@ -30,7 +30,7 @@ impl Format for Osl {
 
 fn text(mapping: &Mapping) -> String {
     let name = mapping.name();
-    let mut text = comment(&mapping.header, "//");
+    let mut text = ascii_comment(&mapping.header, "//");
     text += "// Values outside the range are moved to its nearest end.\n";
     for function in &mapping.functions {
         let code = code(mapping, function);
@@ -52,7 +52,7 @@ fn text(mapping: &Mapping) -> String {
     let ports = mapping.ports();
     let outputs = mapping.outputs.iter().zip(&ports).map(|(o, port)| {
         let kind = if o.channels.len() == 3 { "color" } else { "float" };
-        format!("    output {kind} {port} = 0 [[ string help = \"{}\" ]]", o.title)
+        format!("    output {kind} {port} = 0 [[ string help = \"{}\" ]]", ascii(&o.title))
     });
     text += &inputs.chain(outputs).collect::<Vec<_>>().join(",\n");
     text += ")\n{\n";
@@ -70,7 +70,7 @@ fn text(mapping: &Mapping) -> String {
 fn parameter(input: &Input) -> String {
     let name = identifier(&input.name);
     let [min, max] = input.range.map(number);
-    let help = format!("string help = \"{}\"", input.title);
+    let help = format!("string help = \"{}\"", ascii(&input.title));
     if input.is_colour {
         let default = input.default.map(number).join(", ");
         return format!("    color {name} = color({default}) [[ {help} ]]");
