@@ -53,6 +53,13 @@ struct Panel {
     marks: Vec<(Vec<f64>, Flag)>,
 }
 
+impl Panel {
+    /// Values of a parameter, with neither curve nor marks.
+    fn new(title: String, axes: Vec<Ruler>, values: Vec<f64>, (range, is_log): ([f64; 2], bool)) -> Self {
+        Self { title, axes, values, range, is_log, is_error: false, curve: vec![], marks: vec![] }
+    }
+}
+
 /// Draws a probe into a .png or .svg file.
 pub(crate) fn draw(probe: &Probe, path: &Path) -> anyhow::Result<()> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -142,16 +149,7 @@ fn rows(probe: &Probe) -> anyhow::Result<Vec<Vec<Panel>>> {
         let axes = scales.iter().zip(fine).map(|(s, centres)| Ruler { centres, ..s.clone() }).collect();
         let Panel { range, is_log, .. } = first[k];
         let title = title(k, &parameter.describe());
-        second.push(Panel {
-            title,
-            axes,
-            values,
-            range,
-            is_log,
-            is_error: false,
-            curve: vec![],
-            marks: vec![],
-        });
+        second.push(Panel::new(title, axes, values, (range, is_log)));
     }
     Ok(if second.is_empty() { vec![first] } else { vec![first, second] })
 }
@@ -220,24 +218,14 @@ fn panel(
     scales: &[Ruler],
     places: &[usize],
     title: String,
-    (range, is_log): ([f64; 2], bool),
+    range: ([f64; 2], bool),
     value: &dyn Fn(&Entry) -> f64,
 ) -> Panel {
     let of = |place: &usize| {
         let entry = &probe.entries[*place];
         if entry.failed.is_some() { f64::NAN } else { value(entry) }
     };
-    let values = places.iter().map(of).collect();
-    Panel {
-        title,
-        axes: scales.to_vec(),
-        values,
-        range,
-        is_log,
-        is_error: false,
-        curve: vec![],
-        marks: vec![],
-    }
+    Panel::new(title, scales.to_vec(), places.iter().map(of).collect(), range)
 }
 
 /// A parameter with its unit.

@@ -1,26 +1,19 @@
 //! From tables to smooth functions, inverses, chains and pictures of probes, as a user makes them.
 
-#[allow(dead_code, reason = "other tests keep no light")]
 mod support;
 
 use std::path::Path;
-use std::process::Output;
 
 use serde_json::Value as Json;
 use tempfile::TempDir;
 
-use support::{program, refused};
+use support::{json, lookmatch, refused};
 
-/// The program; light that it prepares is kept for the other commands of a test.
-fn lookmatch(folder: &Path, arguments: &[&str]) -> Output {
-    program(folder).env("LOOKMATCH_CACHE", folder.join("light")).args(arguments).output().unwrap()
-}
-
-/// Runs a command that must succeed and print one JSON document.
-fn json(folder: &Path, arguments: &[&str]) -> Json {
-    let output = lookmatch(folder, arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
+/// A folder where light that one command prepares is kept for the next.
+fn lit_folder() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    std::fs::create_dir(folder.path().join("light")).unwrap();
+    folder
 }
 
 /// A probe of 5 × 5 source points from tiny pictures.
@@ -41,7 +34,7 @@ fn strip(folder: &Path, name: &str, output: &str) {
 
 #[test]
 fn a_probe_is_fitted_inverted_and_composed() {
-    let folder = TempDir::new().unwrap();
+    let folder = lit_folder();
     let of = folder.path();
     remap(of, "ward", "ggx", "ab.json");
     let fit = &read(of, "ab.json")["fit"];
@@ -110,7 +103,7 @@ fn pixels(path: &Path) -> (u32, u32, Vec<u8>) {
 
 #[test]
 fn probes_are_drawn() {
-    let folder = TempDir::new().unwrap();
+    let folder = lit_folder();
     let of = folder.path();
     remap(of, "ward", "as", "plane.json");
     remap(of, "as", "beckmann-conductor", "line.json");

@@ -115,6 +115,11 @@ fn faults_are_told_once_and_leave_nothing() {
         2,
         &["gamma", "linear"],
     );
+    // What textures do not go through is refused, not left out.
+    for unsupported in [&["--smooth"][..], &["--then", PROBE]] {
+        let arguments = [&with("roughness=r.png")[..], unsupported].concat();
+        run(&arguments, 2, &[unsupported[0], "--texture", "cannot be used with"]);
+    }
     refused(
         folder.path(),
         &["apply", PROBE, "-o", "out", "specular=0.2", "roughness=0.3"],

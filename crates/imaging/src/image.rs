@@ -68,6 +68,18 @@ impl Image {
         self.pixels[y * self.width + x]
     }
 
+    /// What becomes of each value and the other image's at the same pixel and channel.
+    ///
+    /// # Panics
+    /// If the sizes differ, like indexing a slice.
+    pub fn zipped(&self, other: &Image, combined: impl Fn(f32, f32) -> f32) -> Image {
+        let sizes = [(self.width, self.height), (other.width, other.height)];
+        assert_eq!(sizes[0], sizes[1], "images of one size");
+        let pixel = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| combined(a[c], b[c]));
+        let pixels = self.pixels.iter().zip(&other.pixels).map(pixel).collect();
+        Self { pixels, ..*self }
+    }
+
     /// Checks that two images can be compared pixel by pixel.
     ///
     /// # Errors
@@ -121,6 +133,21 @@ mod tests {
         let reds: Vec<f32> = joined.pixels().iter().map(|p| p[0]).collect();
         assert_eq!(reds, [1.0, 5.0, 6.0, 2.0, 0.0, 0.0]);
         assert_eq!((joined.width(), joined.height()), (3, 2));
+    }
+
+    #[test]
+    fn zipped_pairs_equal_pixels_and_channels() {
+        let a = Image::from_fn(2, 3, |x, y| [x as f32, y as f32, 1.0]);
+        let b = Image::from_fn(2, 3, |x, y| [10.0, x as f32, y as f32]);
+        let difference = a.zipped(&b, |a, b| a - b);
+        assert_eq!((difference.width(), difference.height()), (2, 3));
+        assert_eq!(difference.get(1, 2), [-9.0, 1.0, -1.0]);
+    }
+
+    #[test]
+    #[should_panic(expected = "images of one size")]
+    fn zipped_never_cuts_the_larger_image() {
+        Image::new(2, 3).zipped(&Image::new(3, 2), |a, _| a);
     }
 
     #[test]

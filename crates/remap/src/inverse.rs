@@ -1,7 +1,7 @@
 //! The inverse of a probe: from target parameters back to source parameters.
 
 use lookmatch_materials::Scale;
-use lookmatch_search::Axis;
+use lookmatch_search::{Axis, Bounds, Lattice};
 use rayon::prelude::*;
 
 use crate::apply::{Reading, read};
@@ -44,15 +44,14 @@ struct Forward<'a> {
 /// # Errors
 /// A probe of a single source, one whose targets are all the same, or one with fewer varying target parameters than source parameters.
 pub fn invert(probe: &Probe) -> Result<Probe, RemapError> {
-    let starts = starts(probe);
+    let starts = starts(probe)?;
     let forward = Forward::new(probe, &starts)?;
     let from_axes = forward.axes()?;
     let images: Vec<Vec<f64>> =
         starts.par_iter().map(|s| Ok(forward.target(s)?.1)).collect::<Result<_, RemapError>>()?;
-    let count: usize = from_axes.iter().map(Axis::len).product();
-    let found: Vec<(Entry, bool)> = (0..count)
-        .into_par_iter()
-        .map(|place| forward.entry(&point(&from_axes, place), &starts, &images))
+    let found: Vec<(Entry, bool)> = points(from_axes.clone())
+        .par_iter()
+        .map(|target| forward.entry(target, &starts, &images))
         .collect::<Result<_, RemapError>>()?;
     let unreachable =
         found.iter().enumerate().filter(|(_, (_, is_reached))| !is_reached).map(|(k, _)| k).collect();
@@ -68,7 +67,7 @@ pub fn invert(probe: &Probe) -> Result<Probe, RemapError> {
         source_axes: from_axes,
         held: Vec::new(),
         search: "inverse".into(),
-        totals: Totals { evaluations: 0, lattice_points: target_axes.iter().map(Axis::len).product() },
+        totals: Totals::derived(&target_axes),
         target_axes,
         entries: found.into_iter().map(|(entry, _)| entry).collect(),
         fit: None,
@@ -98,29 +97,17 @@ fn numeric(axis: &Axis) -> Axis {
 }
 
 /// Shares of the source axes, on a regular grid.
-fn starts(probe: &Probe) -> Vec<Vec<f64>> {
+fn starts(probe: &Probe) -> Result<Vec<Vec<f64>>, RemapError> {
     let axes = probe.source_axes.len();
     let each = (STARTS.powf(1.0 / axes.max(1) as f64) as usize).clamp(3, 257);
-    let share = |k: usize| k as f64 / (each - 1) as f64;
-    let mut starts = vec![Vec::new()];
-    for _ in 0..axes {
-        let extended = |start: &Vec<f64>| {
-            let start = start.clone();
-            (0..each).map(move |k| [&start[..], &[share(k)]].concat())
-        };
-        starts = starts.iter().flat_map(extended).collect();
-    }
-    starts
+    let shares = Axis::listed("share", (0..each).map(|k| k as f64 / (each - 1) as f64).collect())?;
+    Ok(points(vec![shares; axes]))
 }
 
-/// The point of some axes at a place in lexicographic order.
-fn point(axes: &[Axis], mut place: usize) -> Vec<f64> {
-    let mut point = vec![0.0; axes.len()];
-    for (k, axis) in axes.iter().enumerate().rev() {
-        point[k] = axis.value(place % axis.len());
-        place /= axis.len();
-    }
-    point
+/// All points of some axes, in lexicographic order.
+fn points(axes: Vec<Axis>) -> Vec<Vec<f64>> {
+    let lattice = Lattice { axes };
+    lattice.points(&Bounds::full(&lattice)).map(|point| lattice.values(&point)).collect()
 }
 
 impl<'a> Forward<'a> {

@@ -96,11 +96,7 @@ impl Takes {
 
 /// `a + share (b − a)`.
 fn mixed(a: &Image, b: &Image, share: f32) -> Image {
-    let mut image = a.clone();
-    for (out, b) in image.pixels_mut().iter_mut().zip(b.pixels()) {
-        (0..3).for_each(|c| out[c] += share * (b[c] - out[c]));
-    }
-    image
+    a.zipped(b, |a, b| a + share * (b - a))
 }
 
 /// Memory for kept pictures, in bytes.

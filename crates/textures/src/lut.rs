@@ -216,14 +216,9 @@ struct Places {
     guide: Vec<Bin>,
 }
 
-/// A part of an axis that is short enough to have one level in it, or none.
-#[derive(Clone, Copy, Debug)]
-struct Bin {
-    /// The level.
-    split: f32,
-    /// For values below and from the level on: lower end of their interval, one over its length, its place.
-    sides: [[f32; 3]; 2],
-}
+/// A part of an axis that is short enough to have one level in it, or none, which is the last one up to its end: the level, the
+/// place of the interval from it on, and one over the length of the intervals below and above.
+type Bin = [f32; 4];
 
 impl Places {
     fn new(levels: &[f64], stride: f32) -> Option<Self> {
@@ -250,7 +245,7 @@ impl Places {
         let (min, max, stride) = (splat(self.range[0]), splat(self.range[1]), splat(self.stride));
         let (scale, last) = (splat(self.scale), splat(self.last));
         let width = S::f32s::LEN;
-        let (mut inside, mut bins) = ([0.0; BLOCK], [0; BLOCK]);
+        let (mut inside, mut parts, mut bins) = ([0.0; BLOCK], [0; BLOCK], [[0.0; 4]; BLOCK]);
         for first in (0..BLOCK).step_by(width) {
             let lanes = first..first + width;
             // A NaN becomes a level: it must not become an index.
@@ -263,17 +258,24 @@ impl Places {
                 part.mul_add(stride, cell).store_slice(&mut cells[lanes]);
             } else {
                 value.store_slice(&mut inside[lanes.clone()]);
-                part.to_int::<S::u32s>().store_slice(&mut bins[lanes]);
+                part.to_int::<S::u32s>().store_slice(&mut parts[lanes]);
             }
         }
         if self.guide.is_empty() {
             return;
         }
-        for texel in 0..BLOCK {
-            let bin = &self.guide[bins[texel] as usize];
-            let [lower, inverse, place] = bin.sides[usize::from(inside[texel] >= bin.split)];
-            fractions[texel] = (inside[texel] - lower) * inverse;
-            cells[texel] += place;
+        for (bin, part) in bins.iter_mut().zip(&parts) {
+            *bin = self.guide[*part as usize];
+        }
+        for first in (0..BLOCK).step_by(width) {
+            let lanes = first..first + width;
+            let [level, place, below, above] = columns(simd, &bins[lanes.clone()]);
+            let past = S::f32s::from_slice(simd, &inside[lanes.clone()]) - level;
+            let is_below = past.simd_lt(splat(0.0));
+            let fraction = is_below.select(past.mul_add(below, splat(1.0)), past * above);
+            fraction.store_slice(&mut fractions[lanes.clone()]);
+            let cell = S::f32s::from_slice(simd, &cells[lanes.clone()]) + place;
+            (cell - is_below.select(stride, splat(0.0))).store_slice(&mut cells[lanes]);
         }
     }
 }
@@ -283,16 +285,12 @@ fn guide(levels: &[f64], stride: f32) -> Option<Vec<Bin>> {
     let (min, max) = (levels[0], levels[levels.len() - 1]);
     let shortest = levels.windows(2).map(|p| p[1] - p[0]).fold(f64::INFINITY, f64::min);
     let bins = ((max - min) / shortest).ceil() as usize + 1;
-    let side = |interval: usize| {
-        let [lower, upper] = [levels[interval], levels[interval + 1]];
-        [lower as f32, (1.0 / (upper - lower)) as f32, interval as f32 * stride]
-    };
+    let inverse = |k: usize| levels.get(k + 1).map_or(0.0, |upper| (1.0 / (upper - levels[k])) as f32);
     let bin = |k: usize| {
-        let end = |k: usize| min + (max - min) * k as f64 / bins as f64;
-        // The last interval that begins before the bin, and the last one that begins before its end.
-        let begun = |at: f64| (levels.partition_point(|l| *l <= at).max(1) - 1).min(levels.len() - 2);
-        let [below, above] = [begun(end(k)), begun(end(k + 1))];
-        Bin { split: levels[above] as f32, sides: [side(below), side(above)] }
+        // The last interval that begins before the bin's end.
+        let end = min + (max - min) * (k + 1) as f64 / bins as f64;
+        let level = (levels.partition_point(|l| *l <= end).max(1) - 1).min(levels.len() - 2);
+        [levels[level] as f32, level as f32 * stride, inverse(level.saturating_sub(1)), inverse(level)]
     };
     (bins <= MAX_BINS).then(|| (0..bins).map(bin).collect())
 }
@@ -395,12 +393,7 @@ fn spread<S: Simd>(
     for (step, found) in found[..texels.len()].chunks(width).enumerate() {
         let first = texels.start + step * width;
         if found.len() == width {
-            let load = |i: usize| S::f32s::from_slice(simd, &found.as_flattened()[i * width..][..width]);
-            // Every second lane, twice: every fourth.
-            let (low, high) = (load(0).deinterleave(load(1)), load(2).deinterleave(load(3)));
-            let (even, odd) = (low.0.deinterleave(high.0), low.1.deinterleave(high.1));
-            let planes = [even.0, odd.0, even.1, odd.1];
-            for (plane, output) in planes.into_iter().zip(&group.lanes) {
+            for (plane, output) in columns(simd, found).into_iter().zip(&group.lanes) {
                 plane.store_slice(&mut outputs[*output][first..first + width]);
             }
         } else {
@@ -411,6 +404,17 @@ fn spread<S: Simd>(
             }
         }
     }
+}
+
+/// As many rows as a register has lanes, by column.
+#[inline(always)]
+fn columns<S: Simd>(simd: S, rows: &[[f32; 4]]) -> [S::f32s; 4] {
+    let width = S::f32s::LEN;
+    let load = |i: usize| S::f32s::from_slice(simd, &rows.as_flattened()[i * width..][..width]);
+    // Every second lane, twice: every fourth.
+    let (low, high) = (load(0).deinterleave(load(1)), load(2).deinterleave(load(3)));
+    let (even, odd) = (low.0.deinterleave(high.0), low.1.deinterleave(high.1));
+    [even.0, odd.0, even.1, odd.1]
 }
 
 #[cfg(test)]

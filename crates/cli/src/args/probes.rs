@@ -19,10 +19,10 @@ pub(crate) struct ApplyArgs {
     #[arg(long)]
     pub(crate) clamp: bool,
     /// Take values from the probe's fit, where it has one, instead of interpolating in its table
-    #[arg(long)]
+    #[arg(long, conflicts_with = "texture")]
     pub(crate) smooth: bool,
     /// Send the result through another probe; may be repeated
-    #[arg(long, value_name = "PROBE")]
+    #[arg(long, value_name = "PROBE", conflicts_with = "texture")]
     pub(crate) then: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) textures: TextureArgs,

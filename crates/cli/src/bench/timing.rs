@@ -104,10 +104,7 @@ type Views = [Vec<[f32; 3]>; 4];
 fn views(stage: &Stage, material: &Material) -> Views {
     let [point, environment] = [&stage.point, &stage.environment].map(|renderer| {
         let diffuse = renderer.render(material, Part::DiffuseOnly);
-        let mut specular = renderer.render(material, Part::Full);
-        for (full, diffuse) in specular.pixels_mut().iter_mut().zip(diffuse.pixels()) {
-            (0..3).for_each(|c| full[c] -= diffuse[c]);
-        }
+        let specular = renderer.render(material, Part::Full).zipped(&diffuse, |full, diffuse| full - diffuse);
         [diffuse, specular].map(|image| image.pixels().to_vec())
     });
     let ([diffuse_point, specular_point], [diffuse_environment, specular_environment]) = (point, environment);

@@ -13,25 +13,7 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
         return super::apply_textures::run(args);
     }
     let probe = Probe::read(&args.probe)?;
-    let mut source = probe.from.clone();
-    let mut named = Vec::new();
-    for text in args.values.iter().chain(&args.textures.fix) {
-        let (name, value) =
-            text.split_once('=').ok_or_else(|| Usage(format!("'{text}' is not NAME=VALUE")))?;
-        let indices = source.model().resolve(name.trim())?;
-        if indices.iter().any(|i| named.contains(i)) {
-            return Err(Usage(format!("'{}' is given twice", name.trim())).into());
-        }
-        source.set(name.trim(), value.trim())?;
-        named.extend(indices);
-    }
-    for axis in &probe.source_axes {
-        if source.model().resolve(&axis.name)?.iter().any(|i| !named.contains(i)) {
-            let (min, max) = (axis.value(0), axis.value(axis.len() - 1));
-            let missing = format!("give '{}' too: {}={min} to {max}", axis.name, axis.name);
-            return Err(Usage(format!("the probe maps {}; {missing}", names(&probe))).into());
-        }
-    }
+    let source = source(&probe, args, &[])?;
     let mut applied = through(&probe, &source, args)?;
     for file in &args.then {
         let next = Probe::read(file)?;
@@ -76,7 +58,50 @@ fn through(probe: &Probe, source: &Material, args: &ApplyArgs) -> anyhow::Result
     Ok(applied)
 }
 
-fn names(probe: &Probe) -> String {
-    let names: Vec<&str> = probe.source_axes.iter().map(|a| a.name.as_str()).collect();
-    names.join(" and ")
+/// The source with the values that are given for its parameters. Every parameter that the probe tabulates must have one, or be
+/// `textured`.
+pub(super) fn source(probe: &Probe, args: &ApplyArgs, textured: &[&str]) -> anyhow::Result<Material> {
+    let mut source = probe.from.clone();
+    let model = source.model();
+    let resolved = textured.iter().map(|name| model.resolve(name)).collect::<Result<Vec<_>, _>>()?;
+    let (textured, mut fixed) = (resolved.concat(), Vec::new());
+    for (name, value) in pairs(args.values.iter().chain(&args.textures.fix), "NAME=VALUE")? {
+        let indices = model.resolve(&name)?;
+        if indices.iter().any(|i| fixed.contains(i)) {
+            return Err(Usage(format!("'{name}' is given twice")).into());
+        }
+        if indices.iter().any(|i| textured.contains(i)) {
+            return Err(Usage(format!("'{name}' has both a texture and a value")).into());
+        }
+        source.set(&name, &value)?;
+        fixed.extend(indices);
+    }
+    for axis in &probe.source_axes {
+        if model.resolve(&axis.name)?.iter().any(|i| !fixed.contains(i) && !textured.contains(i)) {
+            let (name, min, max) = (&axis.name, axis.value(0), axis.value(axis.len() - 1));
+            let names: Vec<&str> = probe.source_axes.iter().map(|a| a.name.as_str()).collect();
+            return Err(Usage(format!(
+                "the probe maps {}; give '{name}' too: {name}={min} to {max}, or --texture {name}=FILE",
+                names.join(" and ")
+            ))
+            .into());
+        }
+    }
+    Ok(source)
+}
+
+/// `NAME=VALUE`, each name once.
+pub(super) fn pairs<'a>(
+    texts: impl IntoIterator<Item = &'a String>,
+    form: &str,
+) -> anyhow::Result<Vec<(String, String)>> {
+    let mut pairs: Vec<(String, String)> = Vec::new();
+    for text in texts {
+        let (name, value) = text.split_once('=').ok_or_else(|| Usage(format!("'{text}' is not {form}")))?;
+        if pairs.iter().any(|(other, _)| other == name.trim()) {
+            return Err(Usage(format!("'{}' is given twice", name.trim())).into());
+        }
+        pairs.push((name.trim().to_owned(), value.trim().to_owned()));
+    }
+    Ok(pairs)
 }

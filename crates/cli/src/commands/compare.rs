@@ -117,13 +117,9 @@ impl Views<'_> {
         }
         let halves = [(material, seed), (material, seed + 1)];
         let mut halves = self.renderers.pictures(place, self.args.samples.div_ceil(2), &halves)?;
-        let [mut noise, mut image] = [1, 0].map(|half| halves.swap_remove(half).picture.image);
-        for (a, b) in image.pixels_mut().iter_mut().zip(noise.pixels_mut()) {
-            for (a, b) in a.iter_mut().zip(b) {
-                (*a, *b) = ((*a + *b) / 2.0, (*a - *b) / 2.0);
-            }
-        }
-        Ok(View { image, noise: Some(noise) })
+        let [b, a] = [1, 0].map(|half| halves.swap_remove(half).picture.image);
+        let noise = a.zipped(&b, |a, b| (a - b) / 2.0);
+        Ok(View { image: a.zipped(&b, |a, b| (a + b) / 2.0), noise: Some(noise) })
     }
 }
 

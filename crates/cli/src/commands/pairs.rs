@@ -1,8 +1,8 @@
 //! `lookmatch pairs`: every ordered pair of models in one run, as a table and a picture.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::Ordering;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::Context;
@@ -17,7 +17,7 @@ use crate::Usage;
 use crate::args::PairsArgs;
 use crate::commands::create_folder;
 use crate::output::{bar, print, print_json, table};
-use crate::renderers::only_ours;
+use crate::renderers::{interruption, only_ours};
 use crate::transport::{Preparation, cache};
 
 /// All that is known of a run: what decides its outcome, and the pairs that are done.
@@ -84,9 +84,7 @@ fn search(
         mask: args.mask,
         ..Options::default()
     };
-    let stopped = Arc::new(AtomicBool::new(false));
-    let flag = stopped.clone();
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+    let stopped = interruption()?;
     let Some((from, to)) = wanted.first() else {
         return Err(Usage("none of the models can be a target; add one more".into()).into());
     };

@@ -225,6 +225,8 @@ fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
         mask: args.mask,
         quick: args.quick,
         size: args.size,
+        pairs: args.pair.clone(),
+        refine: args.refine,
         sampling: Sampling {
             samples: args.samples,
             most: args.max_samples.unwrap_or(args.samples * if args.quick { 1 } else { 4 }).max(args.samples),

@@ -115,11 +115,8 @@ fn body_alone(
         Usage(format!("{material} has no diffuse reflection that --diffuse-only could show"))
     })?;
     let shown = take(&[&coloured, &black])?;
-    let (black, mut image) = (&shown[1].picture.image, shown[0].picture.image.clone());
-    for (pixel, black) in image.pixels_mut().iter_mut().zip(black.pixels()) {
-        (0..3).for_each(|c| pixel[c] = share as f32 * (pixel[c] - black[c]));
-    }
-    Ok((image, shown))
+    let [coloured, black] = [0, 1].map(|i: usize| &shown[i].picture.image);
+    Ok((coloured.zipped(black, |all, lobe| share as f32 * (all - lobe)), shown))
 }
 
 fn renderer(name: &str) -> anyhow::Result<&'static RendererEntry> {

@@ -5,10 +5,13 @@ use std::process::{Command, Output};
 
 use serde_json::Value as Json;
 
-/// The program in a folder; it keeps no light, so that no test sees what another program prepared.
+/// The program in a folder. No test sees light that another one prepared: it is kept in the folder's `light`, or nowhere if there
+/// is none.
 pub fn program(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookmatch"));
-    command.current_dir(folder).env("LOOKMATCH_CACHE", "off");
+    let light = folder.join("light");
+    let cache = if light.is_dir() { light.into_os_string() } else { "off".into() };
+    command.current_dir(folder).env("LOOKMATCH_CACHE", cache);
     command
 }
 

@@ -24,10 +24,7 @@ pub fn nrmsd(source: &Image, target: &Image, mask: Option<&Mask>) -> Result<[f64
 /// As [`nrmsd`].
 pub fn nrmsd_of_noise(picture: &Image, noise: &Image, mask: Option<&Mask>) -> Result<[f64; 3], ImageError> {
     picture.check_same_size(noise).map_err(|error| error.in_image("picture and noise"))?;
-    let mut noisy = picture.clone();
-    let values = noise.pixels().as_flattened();
-    noisy.pixels_mut().as_flattened_mut().iter_mut().zip(values).for_each(|(value, noise)| *value += noise);
-    nrmsd(picture, &noisy, mask)
+    nrmsd(picture, &picture.zipped(noise, |value, noise| value + noise), mask)
 }
 
 /// [`nrmsd`] of pixels held in `f64`, with one weight per pixel or none.

@@ -388,12 +388,8 @@ impl<'a> Judge<'a> {
         let [source, copy, probe] = &materials;
         let [(seen, noise), (copied, _), (matched, noise_of_match)] =
             [self.picture(source)?, self.picture(copy)?, self.picture(probe)?];
-        let mut noisy = seen.clone();
-        for noise in [noise, noise_of_match].into_iter().flatten() {
-            for (out, noise) in noisy.pixels_mut().iter_mut().zip(noise.pixels()) {
-                (0..3).for_each(|c| out[c] += noise[c]);
-            }
-        }
+        let noises = [noise, noise_of_match].into_iter().flatten();
+        let noisy = noises.fold(seen.clone(), |image, noise| image.zipped(&noise, |a, b| a + b));
         let mean = |image: &Image| Ok(nrmsd(&seen, image, None)?.iter().sum::<f64>() / 3.0);
         let each = |measure: &dyn Fn(&Image) -> anyhow::Result<f64>| -> anyhow::Result<Seen> {
             Ok(Seen { copy: measure(&copied)?, probe: measure(&matched)?, noise: measure(&noisy)? })

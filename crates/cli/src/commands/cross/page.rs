@@ -81,8 +81,9 @@ fn round_trips(checks: &[&Outcome]) -> String {
     let mut text = String::from(
         "\n## The same model in two renderers\n\nHere the right answer is known: that of the copy. The roughness is in the target's own \
          terms (Mitsuba's `alpha` is the square of Cycles' `roughness`), in steps of the lattice that was searched, with up to 4 times as many \
-         samples; and the NRMSD of the probe as a multiple of the noise, which is 1 for equal materials.\n\n| source to target | materials | step | steps off, at worst | NRMSD / \
-         noise, mean | at worst | copy, mean |\n|---|---|---|---|---|---|---|\n",
+         samples; and the NRMSD of the probe as a multiple of the noise, which is 1 for equal materials. Undecided are those \
+         matches that noise leaves no better than a neighbour's.\n\n| source to target | materials | step | steps off, at worst | NRMSD / \
+         noise, mean | at worst | copy, mean | undecided |\n|---|---|---|---|---|---|---|---|\n",
     );
     for outcome in checks {
         let (Some((name, step)), Some(off)) = (&outcome.width, outcome.steps_off()) else { continue };
@@ -95,6 +96,7 @@ fn round_trips(checks: &[&Outcome]) -> String {
             format!("{:.3}", mean.probe / mean.noise),
             format!("{:.3}", outcome.noises()),
             format!("{:.3}", mean.copy / mean.noise),
+            outcome.undecided.to_string(),
         ]);
     }
     text
@@ -149,4 +151,20 @@ pub(super) fn summary(run: &Run) -> String {
         rows.push(cells);
     }
     table(&rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_says_what_its_numbers_say() {
+        let file = |name: &str| {
+            std::fs::read_to_string(format!("{}/../../docs/results/{name}", env!("CARGO_MANIFEST_DIR")))
+                .unwrap()
+        };
+        let run: Run = serde_json::from_str(&file("cross-renderer/cross-renderer.json")).unwrap();
+        assert!(run.pairs.iter().any(Outcome::is_same_model));
+        assert!(page(&run) == file("cross-renderer.md"), "write it with `lookmatch cross -o docs/results`");
+    }
 }
