@@ -34,7 +34,8 @@ fn read(folder: &Path, name: &str) -> Json {
 /// A probe of some source points from tiny pictures.
 fn remap(folder: &Path, models: [&str; 2], more: &[&str], output: &str) {
     let [from, to] = models;
-    let quick = ["remap", from, to, "--quick", "--mask", "--size", "32", "-o", output, "--json"];
+    let size = if more.is_empty() { "32" } else { "16" };
+    let quick = ["remap", from, to, "--quick", "--mask", "--size", size, "-o", output, "--json"];
     json(folder, &[&quick, more].concat());
 }
 
@@ -212,29 +213,33 @@ fn run_glsl(
     serde_json::from_str(&pipe(&mut Command::new(folder.join("glsl")), "")).unwrap()
 }
 
-/// Every format that can be run here, from the table and from the fit.
+/// From the table and from the fit.
 fn exports_agree(folder: &Path, probe: &str, colour: Option<&str>) {
+    run_both(folder, probe, colour, &[]);
+    run_both(folder, probe, colour, &["--smooth"]);
+}
+
+/// Runs an export as Python and as GLSL, whose text it returns.
+fn run_both(folder: &Path, probe: &str, colour: Option<&str>, more: &[&str]) -> String {
     let points = points(&read(folder, probe), colour);
-    for more in [&[][..], &["--smooth"]] {
-        let expected = expected(folder, probe, &points, more);
-        let export = |format: &str, file: &str| {
-            let arguments = [&["export", probe, "--to", format, "-o", file, "--json"], more].concat();
-            let report = json(folder, &arguments);
-            for output in report["outputs"].as_array().unwrap() {
-                assert!(output["error"].as_f64().unwrap() < TOLERANCE, "{probe}, {format}: {output}");
-            }
-            assert_eq!(report["notes"].as_array().unwrap().len(), 0, "{report}");
-            std::fs::read_to_string(folder.join(file)).unwrap()
-        };
-        let module = probe.trim_end_matches(".json");
-        let text = export("python", &format!("{module}.py"));
-        let function =
-            text.lines().find_map(|l| l.strip_prefix("def ")?.split_once("(*")).unwrap().0.to_owned();
-        compare("python", &run_python(folder, module, &function, &points), &expected, &points, "");
-        let text = export("glsl", "probe.glsl");
-        compile_glsl(&text);
-        compare("glsl", &run_glsl(folder, &text, &function, &expected[0], &points), &expected, &points, "");
-    }
+    let expected = expected(folder, probe, &points, more);
+    let export = |format: &str, file: &str| {
+        let arguments = [&["export", probe, "--to", format, "-o", file, "--json"], more].concat();
+        let report = json(folder, &arguments);
+        for output in report["outputs"].as_array().unwrap() {
+            assert!(output["error"].as_f64().unwrap() < TOLERANCE, "{probe}, {format}: {output}");
+        }
+        assert_eq!(report["notes"].as_array().unwrap().len(), 0, "{report}");
+        std::fs::read_to_string(folder.join(file)).unwrap()
+    };
+    let module = probe.trim_end_matches(".json");
+    let text = export("python", &format!("{module}.py"));
+    let function = text.lines().find_map(|l| l.strip_prefix("def ")?.split_once("(*")).unwrap().0.to_owned();
+    compare("python", &run_python(folder, module, &function, &points), &expected, &points, "");
+    let text = export("glsl", "probe.glsl");
+    compile_glsl(&text);
+    compare("glsl", &run_glsl(folder, &text, &function, &expected[0], &points), &expected, &points, "");
+    text
 }
 
 #[test]
@@ -249,6 +254,27 @@ fn exports_say_what_apply_says() {
     // A body under an interface, and a colour that is multiplied.
     remap(of, ["ward", "standard-surface"], &[], "interface.json");
     exports_agree(of, "interface.json", Some("diffuse"));
+}
+
+#[test]
+fn switches_hues_and_bodies_that_bend_are_exported() {
+    let folder = TempDir::new().unwrap();
+    let of = folder.path();
+    // A switch takes the nearest point's value.
+    remap(of, ["ward", "ggx"], &[], "switch.json");
+    let mut probe = read(of, "switch.json");
+    let entries = probe["entries"].as_array_mut().unwrap();
+    let entries = entries.iter_mut().enumerate().filter(|(n, _)| n % 3 == 0);
+    entries.for_each(|(_, entry)| entry["target"][0] = 0.0.into());
+    probe.as_object_mut().unwrap().remove("fit");
+    std::fs::write(of.join("switch.json"), probe.to_string()).unwrap();
+    run_both(of, "switch.json", Some("diffuse"), &[]);
+    // A searched colour has the hue of the source's, which may be black.
+    remap(of, ["ward", "ggx"], &["--vary", "target.diffuse=0.2:0.6:0.2"], "hue.json");
+    assert!(run_both(of, "hue.json", Some("diffuse"), &[]).contains("_hue("));
+    // The body of a plastic is no multiple of what is seen of it.
+    remap(of, ["ward", "rough-plastic"], &[], "bent.json");
+    run_both(of, "bent.json", Some("diffuse"), &[]);
 }
 
 /// Rows of a look-up table, and its head.
@@ -514,13 +540,11 @@ fn materialx_documents_are_valid_and_agree() {
     let folder = TempDir::new().unwrap();
     let of = folder.path();
     let three = [
-        "--vary",
-        "specular=0.04:0.08:0.02",
-        "--vary",
-        "roughness_u=0.1:0.2:0.1",
-        "--vary",
-        "roughness_v=0.1:0.3:0.1",
+        ["--vary", "specular=0.04:0.08:0.04"],
+        ["--vary", "roughness_u=0.1:0.2:0.1"],
+        ["--vary", "roughness_v=0.1:0.3:0.1"],
     ];
+    let three = three.concat();
     for (models, more, colour, shader) in [
         (["ward", "ggx"], &[][..], Some("diffuse"), None),
         (["ward", "ggx"], &three, Some("diffuse"), None),

@@ -473,10 +473,9 @@ impl Derivation<'_> {
         if let Some(place) = self.functions.iter().position(same) {
             return Some(place);
         }
-        let taken = self.functions.iter().filter(|f| f.name.starts_with(&function.name)).count();
-        if taken > 0 {
-            function.name = format!("{}_{}", function.name, taken + 1);
-        }
+        let is_free = |name: &String| self.functions.iter().all(|f| f.name != *name);
+        let numbered = (2..).map(|n| format!("{}_{n}", function.name));
+        function.name = [function.name.clone()].into_iter().chain(numbered).find(is_free).unwrap_or_default();
         self.functions.push(function);
         Some(self.functions.len() - 1)
     }

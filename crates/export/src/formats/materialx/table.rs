@@ -57,11 +57,12 @@ impl Graph {
     /// For each of four levels: how much of the way from the level before has been made.
     fn lines(&mut self, name: &str, place4: &str, levels: &[f64], first: usize) -> String {
         let last = levels[levels.len() - 1];
+        let span = last - levels[0];
         let ends = |k: usize| match first + k {
             // Before the first level nothing is, behind the last nothing either.
-            0 => [levels[0] - 1.0, levels[0]],
+            0 => [levels[0] - span, levels[0]],
             k if k < levels.len() => [levels[k - 1], levels[k]],
-            _ => [last, last + 1.0],
+            _ => [last, last + span],
         };
         let [low, high] = [0, 1].map(|side| vector(std::array::from_fn(|k| ends(k)[side])));
         let inputs =
@@ -170,7 +171,6 @@ impl Graph {
     fn total(&mut self, name: &str, kind: &str, parts: Vec<String>) -> String {
         let mut parts = parts.into_iter().enumerate();
         let (_, first) = parts.next().unwrap_or_default();
-        // The borrow of the type's name ends with the call.
         parts.fold(first, |sum, (k, part)| {
             let inputs = [("in1", kind, Arg::node(&sum)), ("in2", kind, Arg::node(&part))];
             self.add("add", kind, &format!("{name}_{k}"), &inputs)
