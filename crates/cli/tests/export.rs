@@ -540,14 +540,14 @@ fn materialx_documents_are_valid_and_agree() {
     let folder = TempDir::new().unwrap();
     let of = folder.path();
     let three = [
-        ["--vary", "specular=0.04:0.08:0.04"],
-        ["--vary", "roughness_u=0.1:0.2:0.1"],
-        ["--vary", "roughness_v=0.1:0.3:0.1"],
+        ["--vary", "source.specular=0.5:1:0.5"],
+        ["--vary", "source.f0=0.1:0.5:0.2"],
+        ["--vary", "source.exponent=10:210:100"],
     ];
     let three = three.concat();
     for (models, more, colour, shader) in [
         (["ward", "ggx"], &[][..], Some("diffuse"), None),
-        (["ward", "ggx"], &three, Some("diffuse"), None),
+        (["ashikhmin-shirley", "ggx"], &three, Some("diffuse"), None),
         (["ashikhmin-shirley", "beckmann-conductor"], &[], None, None),
         (["ward", "standard-surface"], &[], Some("diffuse"), Some("standard_surface")),
         (["ward", "gltf"], &[], Some("diffuse"), Some("gltf_pbr")),
