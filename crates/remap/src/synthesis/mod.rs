@@ -385,12 +385,15 @@ impl Stratum {
     }
 
     fn loadings_at(&self, places: &[Vec<f64>], lengths: &[usize]) -> Vec<Vec<f64>> {
-        let nearest = |place: &Vec<f64>| joined(&self.loadings[self.around(place, 1)[0]], lengths);
+        let nearest = |place: &Vec<f64>| {
+            let around = self.around(place, 1, self.points.len());
+            around.first().map_or_else(Vec::new, |k| joined(&self.loadings[*k], lengths))
+        };
         match &self.function {
             Some(Surface::Smooth(function)) => function.at_all(places),
             Some(Surface::Local(metric, values)) => {
                 let local = |place: &Vec<f64>| {
-                    let around = self.around(place, AROUND);
+                    let around = self.around(place, AROUND, values.len());
                     let points: Vec<Vec<f64>> = around.iter().map(|k| self.points[*k].clone()).collect();
                     let values: Vec<Vec<f64>> = around.iter().map(|k| values[*k].clone()).collect();
                     let function = Interpolation::fit(metric.clone(), &points, &values);
@@ -402,10 +405,10 @@ impl Stratum {
         }
     }
 
-    /// The places of the points nearest to another, nearest first.
-    fn around(&self, place: &[f64], count: usize) -> Vec<usize> {
+    /// The places of those of the first points that are nearest to another point, nearest first.
+    fn around(&self, place: &[f64], count: usize, first: usize) -> Vec<usize> {
         let squared = |k: usize| self.points[k].iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        let mut order: Vec<(f64, usize)> = (0..self.points.len()).map(|k| (squared(k), k)).collect();
+        let mut order: Vec<(f64, usize)> = (0..first).map(|k| (squared(k), k)).collect();
         let count = count.min(order.len());
         let by_distance = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if count < order.len() {
