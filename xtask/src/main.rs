@@ -10,13 +10,13 @@ Usage: cargo xtask COMMAND
 
 Commands:
   test [--all-renderers]   Check format, lints, tests, documentation and real renderers; stop at the first failure.
-                           Mitsuba, Cycles and Radiance are installed for it; with --all-renderers all that lookmatch knows
+                           MaterialX, Mitsuba, Cycles and Radiance are installed for it; with --all-renderers all that lookmatch knows
   help                     Print this text
 
 Exit codes: 0 all is well, 1 a step failed, 2 the command line is wrong";
 
 /// What must pass before a change goes in, quickest first.
-const STEPS: [Step; 6] = [
+const STEPS: [Step; 7] = [
     Step {
         name: "format",
         variable: None,
@@ -55,6 +55,15 @@ const STEPS: [Step; 6] = [
         name: "peer",
         variable: None,
         arguments: &["test", "--package", "lookmatch", "--test", "cli", "--locked", "--", "--ignored"],
+        files: None,
+        component: None,
+        program: Some("python3"),
+    },
+    // The official MaterialX, which the test installs for itself, reads what is exported.
+    Step {
+        name: "exports",
+        variable: None,
+        arguments: &["test", "--package", "lookmatch", "--test", "export", "--locked", "--", "--ignored"],
         files: None,
         component: None,
         program: Some("python3"),

@@ -45,6 +45,8 @@ pub(crate) enum Command {
     Invert(InvertArgs),
     /// Make one probe of two: A to B, then B to C
     Compose(ComposeArgs),
+    /// Write a probe as a shader, a node graph, a look-up table or a script
+    Export(ExportArgs),
     /// Render two materials side by side and measure their difference
     Compare(CompareArgs),
     /// Judge a probe in a scene that its search never saw

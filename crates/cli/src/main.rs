@@ -19,6 +19,7 @@ use mimalloc::MiMalloc;
 use clap::Parser;
 
 use args::{Arguments, Command};
+use lookmatch_export::ExportError;
 use lookmatch_materials::MaterialError;
 use lookmatch_remap::RemapError;
 use lookmatch_renderers::InstallationError;
@@ -54,6 +55,7 @@ fn run(command: Command) -> anyhow::Result<()> {
         Command::Fit(args) => commands::fit::run(&args),
         Command::Invert(args) => commands::invert::run(&args),
         Command::Compose(args) => commands::compose::run(&args),
+        Command::Export(args) => commands::export::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
         Command::Validate(args) => commands::validate::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
@@ -91,6 +93,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
             .is_some_and(|e| matches!(e, InstallationError::Unknown { .. }))
         || error.downcast_ref::<MaterialError>().is_some_and(MaterialError::is_usage)
         || error.downcast_ref::<RemapError>().is_some_and(RemapError::is_usage)
+        || error.downcast_ref::<ExportError>().is_some_and(ExportError::is_usage)
         || error.downcast_ref::<TextureError>().is_some_and(TextureError::is_usage);
     if usage { 2 } else { 1 }
 }

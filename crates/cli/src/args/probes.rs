@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use lookmatch_export::formats;
 
 use super::Json;
 
@@ -98,4 +100,32 @@ pub(crate) struct ComposeArgs {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct ExportArgs {
+    /// The probe file
+    pub(crate) probe: PathBuf,
+    /// The language
+    #[arg(long, value_name = "FORMAT", value_parser = export_formats())]
+    pub(crate) to: String,
+    /// Functions of the probe's fit, where it has some, instead of its table: shorter, and equal to `apply --smooth`
+    #[arg(long)]
+    pub(crate) smooth: bool,
+    /// Give a source parameter a value instead of making it an input; may be repeated
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub(crate) fix: Vec<String>,
+    /// The file; where a .cube file cannot hold all parameters, more of them beside it
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+fn export_formats() -> PossibleValuesParser {
+    formats()
+        .iter()
+        .map(|format| PossibleValue::new(format.name()).help(format.summary()))
+        .collect::<Vec<_>>()
+        .into()
 }

@@ -8,6 +8,7 @@ pub(crate) mod compare;
 pub(crate) mod compose;
 pub(crate) mod cross;
 pub(crate) mod eval;
+pub(crate) mod export;
 pub(crate) mod fit;
 pub(crate) mod inspect;
 pub(crate) mod invert;

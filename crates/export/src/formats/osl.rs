@@ -1,0 +1,80 @@
+//! OSL: a shader with an input for each source parameter and an output for each target parameter.
+
+use std::fmt::Write;
+
+use lookmatch_remap::Probe;
+
+use super::code::{ascii, ascii_comment, code, expressions, hues, number, rows};
+use super::{Exported, Format, Options};
+use crate::ExportError;
+use crate::mapping::{Input, Mapping, identifier};
+
+/// `osl`.
+pub(crate) struct Osl;
+
+impl Format for Osl {
+    fn name(&self) -> &'static str {
+        "osl"
+    }
+
+    fn summary(&self) -> &'static str {
+        "a shader node (Open Shading Language) with source parameters in and target parameters out"
+    }
+
+    fn export(&self, probe: &Probe, options: &Options) -> Result<Exported, ExportError> {
+        let mapping = Mapping::new(probe, options)?;
+        let text = text(&mapping);
+        Ok(Exported::of(mapping, text))
+    }
+}
+
+fn text(mapping: &Mapping) -> String {
+    let name = mapping.name();
+    let mut text = ascii_comment(&mapping.header, "//");
+    text += "// Values outside the range are moved to its nearest end.\n";
+    for function in &mapping.functions {
+        let code = code(mapping, function);
+        writeln!(text, "\n{}\n{{", code.signature).ok();
+        for (array, values) in &code.arrays {
+            writeln!(text, "    float {array}[{}] = {{{}}};", values.len(), rows(values, number, "        "))
+                .ok();
+        }
+        text = text + &code.body + "}\n";
+    }
+    let hues = hues(mapping);
+    if !hues.is_empty() {
+        text += "\n// A colour divided by its largest channel; white for black.\n";
+        writeln!(text, "color {name}_hue(color c)\n{{\n    float largest = max(c[0], max(c[1], c[2]));").ok();
+        text += "    if (largest > 0) return c / largest;\n    return color(1);\n}\n";
+    }
+    writeln!(text, "\nshader {name}(").ok();
+    let inputs = mapping.inputs.iter().map(parameter);
+    let ports = mapping.ports();
+    let outputs = mapping.outputs.iter().zip(&ports).map(|(o, port)| {
+        let kind = if o.channels.len() == 3 { "color" } else { "float" };
+        format!("    output {kind} {port} = 0 [[ string help = \"{}\" ]]", ascii(&o.title))
+    });
+    text += &inputs.chain(outputs).collect::<Vec<_>>().join(",\n");
+    text += ")\n{\n";
+    for hue in hues {
+        writeln!(text, "    color hue_{hue} = {name}_hue({hue});").ok();
+    }
+    for (output, port) in mapping.outputs.iter().zip(ports) {
+        let value = expressions(mapping, output).join(", ");
+        let value = if output.channels.len() == 1 { value } else { format!("color({value})") };
+        writeln!(text, "    {port} = {value};").ok();
+    }
+    text + "}\n"
+}
+
+fn parameter(input: &Input) -> String {
+    let name = identifier(&input.name);
+    let [min, max] = input.range.map(number);
+    let help = format!("string help = \"{}\"", ascii(&input.title));
+    if input.is_colour {
+        let default = input.default.map(number).join(", ");
+        return format!("    color {name} = color({default}) [[ {help} ]]");
+    }
+    let default = number(input.default[0]);
+    format!("    float {name} = {default} [[ float min = {min}, float max = {max}, {help} ]]")
+}
