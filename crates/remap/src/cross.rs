@@ -25,7 +25,7 @@ use crate::probe::Noise;
 use crate::stage::LIGHTS;
 use crate::strategy::Matched;
 use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
-use crate::synthesis::Pictures as Planar;
+use crate::synthesis::{Pictures as Planar, Syntheses};
 use crate::{Entry, Plan, RemapError, Stage};
 
 /// Names of the reference scene under its lights, point and environment.
@@ -449,6 +449,7 @@ impl CrossStage {
         plan: &Plan,
         values: &[f64],
         problem: &Problem,
+        syntheses: &Syntheses,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Matched, RemapError> {
         let most = self.sampling.most;
@@ -469,6 +470,7 @@ impl CrossStage {
             source: rounded,
             score: &|look| self.score(&seen, look, with_diffuse),
             foresight,
+            syntheses,
             scores: HashMap::new(),
             stop,
         };

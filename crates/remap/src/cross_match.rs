@@ -12,7 +12,7 @@ use crate::cross::{Look, Score};
 use crate::gallery::{Key, Stopped, stopped};
 use crate::settle::Bowl;
 use crate::strategy::{Counting, searched};
-use crate::synthesis::{Rendered, Synthesis, is_linear};
+use crate::synthesis::{Rendered, Syntheses, Synthesis, is_linear};
 use crate::{CrossStage, Plan, RemapError};
 
 /// Fitness of a candidate that could not be rendered: worse than any picture can be.
@@ -51,6 +51,8 @@ pub(crate) struct CrossMatch<'a> {
     pub(crate) score: &'a (dyn Fn(&Look) -> Score + Sync),
     /// What forecasts need, where the search asks for them.
     pub(crate) foresight: Option<Foresight<'a>>,
+    /// What is known of targets.
+    pub(crate) syntheses: &'a Syntheses,
     /// Points that were compared so far.
     pub(crate) scores: HashMap<Point, f64>,
     pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
@@ -70,7 +72,7 @@ impl CrossMatch<'_> {
     /// Scores of points at a number of samples; those that cannot be rendered score [`FAILED`].
     fn scored(&self, points: &[Point], samples: u32) -> Result<Vec<Score>, RemapError> {
         let targets = self.targets(points)?;
-        self.stage.own.syntheses.count(&targets);
+        self.syntheses.count(&targets);
         let looks = self.stage.looks(&targets, false, samples);
         if let Some(foresight) = &self.foresight {
             self.learn(foresight, points, &looks);
@@ -85,7 +87,7 @@ impl CrossMatch<'_> {
     /// Hands rendered targets to the synthesis of their family.
     fn learn(&self, foresight: &Foresight, points: &[Point], looks: &[Result<Arc<Look>, String>]) {
         let (stage, with_diffuse) = (self.stage, foresight.with_diffuse);
-        let mut families = stage.own.syntheses.families();
+        let mut families = self.syntheses.families();
         let synthesis = families.entry(foresight.family.clone()).or_insert_with(|| {
             let mut shares = stage.own.picture_shares();
             shares.truncate(if with_diffuse { 4 } else { 2 });
@@ -180,7 +182,7 @@ impl Objective for CrossMatch<'_> {
     /// Pictures with noise are further apart than what they show: by as much as the best of those that were compared are.
     fn forecast(&mut self, points: &[Point]) -> Option<Vec<f64>> {
         let foresight = self.foresight.as_ref()?;
-        let mut families = self.stage.own.syntheses.families();
+        let mut families = self.syntheses.families();
         let synthesis = families.get_mut(&foresight.family)?;
         let seen = synthesis.seen(&self.stage.pictures(foresight.seen, foresight.with_diffuse));
         let mut best: Vec<(&Point, f64)> =

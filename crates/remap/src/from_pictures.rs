@@ -20,6 +20,7 @@ use crate::cross::{ByLight, Look, Score};
 use crate::cross_match::{CrossMatch, Settled};
 use crate::gallery::Stopped;
 use crate::stage::LIGHTS;
+use crate::synthesis::Syntheses;
 use crate::{CrossStage, Plan, RemapError};
 
 /// Pictures of a source, by light: point, environment. Those of a light are there or not; diffuse ones for all lights or none.
@@ -346,6 +347,7 @@ impl<'a> Round<'a> {
             source: self.source(),
             score: &|look| self.score(look),
             foresight: None,
+            syntheses: &Syntheses::default(),
             scores: HashMap::new(),
             stop,
         };

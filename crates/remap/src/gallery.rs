@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::carry::{Body, SourceLook};
 use crate::stage::{Appearance, Stage};
-use crate::synthesis::{Rendered, Synthesis, is_linear};
+use crate::synthesis::{Rendered, Syntheses, Synthesis, is_linear};
 use crate::{Plan, RemapError};
 
 /// Memory for kept appearances, in bytes.
@@ -87,6 +87,8 @@ pub(crate) struct Match<'a> {
     pub(crate) compared: HashSet<Point>,
     /// The family of its targets, where pictures are synthesised.
     pub(crate) family: Option<Key>,
+    /// What is known of targets.
+    pub(crate) syntheses: &'a Syntheses,
     /// Asked before each batch; true stops the search.
     pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -99,7 +101,7 @@ pub(crate) struct Stopped;
 impl Match<'_> {
     /// Hands rendered targets to the synthesis of their family.
     fn learn(&self, family: &Key, points: &[Point], targets: &[Material], seen: &[Arc<Appearance>]) {
-        let mut families = self.stage.syntheses.families();
+        let mut families = self.syntheses.families();
         let synthesis = families.entry(family.clone()).or_insert_with(|| {
             Synthesis::new(self.plan.to.model(), self.lattice, self.stage.picture_shares())
         });
@@ -128,7 +130,7 @@ impl Objective for Match<'_> {
         self.compared.extend(points.iter().cloned());
         let material = |p: &Point| self.plan.target_beside(&self.source, &self.lattice.values(p));
         let targets = points.iter().map(material).collect::<Result<Vec<_>, RemapError>>()?;
-        self.stage.syntheses.count(&targets);
+        self.syntheses.count(&targets);
         let seen = self.stage.known_appearances(&targets);
         if let Some(family) = &self.family {
             self.learn(family, points, &targets, &seen);
@@ -137,7 +139,7 @@ impl Objective for Match<'_> {
     }
 
     fn forecast(&mut self, points: &[Point]) -> Option<Vec<f64>> {
-        let mut families = self.stage.syntheses.families();
+        let mut families = self.syntheses.families();
         let synthesis = families.get_mut(self.family.as_ref()?)?;
         let seen = synthesis.seen(&self.stage.pictures(self.appearance));
         synthesis.distances(&seen, points)

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::gallery::Gallery;
 use crate::projection::{Projection, Sketches};
-use crate::synthesis::{Pictures, Syntheses};
+use crate::synthesis::Pictures;
 use crate::{Plan, RemapError};
 
 /// What the metric knows of a material: its specular and diffuse images under both lights in CIELAB, on the subject's
@@ -45,8 +45,6 @@ pub struct Stage {
     gallery: Gallery,
     /// The diffuse images of appearances that still exist.
     diffuse: Mutex<HashMap<DiffuseKey, Weak<Images>>>,
-    /// What synthesis made of rendered targets.
-    pub(crate) syntheses: Syntheses,
 }
 
 impl Stage {
@@ -100,7 +98,7 @@ impl Stage {
         let weights = mask.then(|| on_subject(point.mask().weights()));
         let diffuse = Mutex::new(HashMap::new());
         let gallery = Gallery::new(appearance_bytes(&point));
-        Ok(Self { metric, weights, gallery, diffuse, point, environment, syntheses: Syntheses::default() })
+        Ok(Self { metric, weights, gallery, diffuse, point, environment })
     }
 
     /// Renders materials, on all cores, in their order.

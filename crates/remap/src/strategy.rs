@@ -119,14 +119,6 @@ impl<'a> From<Own<'a>> for Eye<'a> {
 }
 
 impl Eye<'_> {
-    /// What it knows of targets.
-    fn syntheses(&self) -> &Syntheses {
-        match self {
-            Self::Own(Own { stage, .. }) => &stage.syntheses,
-            Self::Cross(stage) => &stage.own.syntheses,
-        }
-    }
-
     /// A match between the levels of the lattice, if the plan wants it.
     fn refined(
         &self,
@@ -134,7 +126,7 @@ impl Eye<'_> {
         lattice: &Lattice,
         matched: Matched,
         (pairing, led): (&Pairing, &Led),
-        stop: &(dyn Fn() -> bool + Sync),
+        (syntheses, stop): (&Syntheses, &(dyn Fn() -> bool + Sync)),
     ) -> Result<Matched, RemapError> {
         let Self::Own(Own { stage, .. }) = self else { return Ok(matched) };
         if !plan.refine || matched.entry.failed.is_some() {
@@ -144,8 +136,17 @@ impl Eye<'_> {
         let source = plan.source_material(&matched.entry.source)?;
         let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
         let (look, compared) = (SourceLook::new(&source), HashSet::new());
-        let mut objective =
-            Match { plan, stage, lattice: &fine, source: look, appearance, compared, family: None, stop };
+        let mut objective = Match {
+            plan,
+            stage,
+            lattice: &fine,
+            source: look,
+            appearance,
+            compared,
+            family: None,
+            syntheses,
+            stop,
+        };
         let (values, fitness) = refine::descend(&fine, centre, plan.seed, &mut objective)?;
         if fitness >= matched.entry.fitness {
             return Ok(matched);
@@ -170,17 +171,18 @@ impl Eye<'_> {
         plan: &Plan,
         values: &[f64],
         problem: &Problem,
+        syntheses: &Syntheses,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Matched, RemapError> {
         match self {
-            Self::Cross(stage) => match stage.find(plan, values, problem, stop) {
+            Self::Cross(stage) => match stage.find(plan, values, problem, syntheses, stop) {
                 Err(_) if stop() => Err(stopped()),
                 // The others may fare better.
                 Err(RemapError::Render(reason)) => Ok(Matched::failed(values, reason)),
                 found => found,
             },
             Self::Own(Own { stage, .. }) => {
-                let outcome = search_one(plan, stage, values, problem, stop)?;
+                let outcome = search_one(plan, stage, values, problem, (syntheses, stop))?;
                 let target = problem.lattice.values(&outcome.best);
                 let entry = entry(plan, stage, problem.lattice, values.to_vec(), &outcome, target)?;
                 Ok(Matched { best: outcome.best, compared: outcome.evaluations, entry })
@@ -198,8 +200,7 @@ fn run(
 ) -> Result<Probe, RemapError> {
     let lattice = Lattice { axes: plan.target_axes.clone() };
     let sources = Lattice { axes: plan.source_axes.clone() };
-    let syntheses = eye.syntheses();
-    syntheses.clear();
+    let syntheses = Syntheses::default();
     let total = sources.len();
     let mut found: Vec<Option<(Point, Entry)>> = vec![None; total];
     let mut journal = match state {
@@ -251,12 +252,12 @@ fn run(
             Some((table, stage)) => search_all(plan, (table, stage), &lattice, &values, problems, stop),
             None => {
                 let points = values.iter().zip(&problems);
-                points.map(|(values, problem)| eye.find(plan, values, problem, stop)).collect()
+                points.map(|(values, problem)| eye.find(plan, values, problem, &syntheses, stop)).collect()
             }
         };
         let results: Vec<Matched> = searched.map_err(|e| interrupted(e, done, total))?;
         for (((place, _), matched), led) in wave.into_iter().zip(results).zip(led) {
-            let matched = eye.refined(plan, &lattice, matched, (&pairing, &led), stop);
+            let matched = eye.refined(plan, &lattice, matched, (&pairing, &led), (&syntheses, stop));
             let Matched { best, compared, entry } = matched.map_err(|e| interrupted(e, done, total))?;
             if let Some(journal) = &mut journal {
                 journal.append(place, &best, &entry)?;
@@ -330,14 +331,15 @@ fn search_one(
     stage: &Stage,
     values: &[f64],
     problem: &Problem,
-    stop: &(dyn Fn() -> bool + Sync),
+    (syntheses, stop): (&Syntheses, &(dyn Fn() -> bool + Sync)),
 ) -> Result<Outcome, RemapError> {
     let source = plan.source_material(values)?;
     let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
     let (lattice, compared) = (problem.lattice, HashSet::new());
     let look = SourceLook::rounded(&source);
     let family = family(plan, &look, Body::Matched)?;
-    let mut objective = Match { plan, stage, lattice, source: look, appearance, compared, family, stop };
+    let mut objective =
+        Match { plan, stage, lattice, source: look, appearance, compared, family, syntheses, stop };
     let found = searched(plan, problem, &mut objective)?;
     let target = plan.target_material(&source, &lattice.values(&found.best))?;
     let seen = stage.known_appearances(&[target]).swap_remove(0);

@@ -1,6 +1,7 @@
 //! Few renders: candidates that synthesised pictures propose, results between levels, constraints that the user pairs.
 
 use std::collections::HashSet;
+use std::sync::OnceLock;
 
 use lookmatch_materials::{Levels, by_name};
 use lookmatch_remap::{Options, Pair, Plan, Probe, Side, Stage, Strategy, Vary, remap};
@@ -33,7 +34,16 @@ fn between(from: &str, to: &str, options: &Options) -> Probe {
 }
 
 fn run(options: &Options) -> Probe {
-    between("ward", "ggx", options)
+    // All of these look at one scene.
+    static STAGE: OnceLock<Stage> = OnceLock::new();
+    let plan = Plan::new(by_name("ward").unwrap(), by_name("ggx").unwrap(), options).unwrap();
+    remap(&plan, STAGE.get_or_init(|| Stage::prepare(&plan).unwrap()), None, &mut |_| {}, &|| false).unwrap()
+}
+
+fn truth(strategy: Strategy) -> &'static Probe {
+    static TRUTH: [OnceLock<Probe>; 2] = [OnceLock::new(), OnceLock::new()];
+    let place = usize::from(strategy == Strategy::Constrained);
+    TRUTH[place].get_or_init(|| run(&Options { strategy, ..options("exhaustive") }))
 }
 
 /// Mean fitness over that of the best.
@@ -47,11 +57,11 @@ fn ratio(found: &Probe, truth: &Probe) -> f64 {
 
 #[test]
 fn synthesis_finds_the_optimum_with_few_renders_and_says_how_far_off_it_was() {
-    let truth = run(&options("exhaustive"));
+    let truth = truth(Strategy::Unconstrained);
     for (search, most) in [("synthesis", 60), ("synthesis-half-rate", 900)] {
         let found = run(&options(search));
         let rendered = found.totals.rendered.unwrap();
-        assert!(ratio(&found, &truth) < 1.01, "{search}: {}", ratio(&found, &truth));
+        assert!(ratio(&found, truth) < 1.01, "{search}: {}", ratio(&found, truth));
         assert!(rendered <= most, "{search}: {rendered} targets of {}", truth.totals.rendered.unwrap());
         let record = found.totals.synthesis.unwrap();
         assert!(record.held_out > 0 && record.mean > 0.0 && record.mean <= record.most, "{record:?}");
@@ -66,19 +76,15 @@ fn synthesis_finds_the_optimum_with_few_renders_and_says_how_far_off_it_was() {
 fn nothing_is_rendered_along_what_is_linear() {
     let options = Options { vary: Vec::new(), quick: true, size: Some(24), ..options("synthesis") };
     let found = between("lafortune", "ward", &options);
-    let truth = between("lafortune", "ward", &Options { search: "exhaustive".into(), ..options });
-    assert!(ratio(&found, &truth) < 1.01, "{}", ratio(&found, &truth));
+    let truth = &between("lafortune", "ward", &Options { search: "exhaustive".into(), ..options });
+    assert!(ratio(&found, truth) < 1.01, "{}", ratio(&found, truth));
     let (rendered, sources) = (found.totals.rendered.unwrap(), found.entries.len());
     assert!(rendered < 30 + 4 * sources, "{rendered} for {sources} sources");
 }
 
 #[test]
 fn synthesis_does_not_depend_on_threads_or_on_what_was_remapped_before() {
-    let plan = |from: &str| {
-        Plan::new(by_name(from).unwrap(), by_name("ggx").unwrap(), &options("synthesis")).unwrap()
-    };
-    let stage = Stage::prepare(&plan("ward")).unwrap();
-    let run = || remap(&plan("ward"), &stage, None, &mut |_| {}, &|| false).unwrap();
+    let run = || run(&options("synthesis"));
     let with_threads = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(run);
     let first = with_threads(1);
     assert_eq!(first, with_threads(3));
@@ -86,9 +92,9 @@ fn synthesis_does_not_depend_on_threads_or_on_what_was_remapped_before() {
 
 #[test]
 fn cma_es_finds_nearly_the_optimum() {
-    let truth = run(&options("exhaustive"));
+    let truth = truth(Strategy::Unconstrained);
     let found = run(&options("cma-es"));
-    assert!(ratio(&found, &truth) < 1.02, "{}", ratio(&found, &truth));
+    assert!(ratio(&found, truth) < 1.02, "{}", ratio(&found, truth));
     assert!(found.totals.evaluations < truth.totals.evaluations / 5);
 }
 
@@ -96,10 +102,10 @@ fn cma_es_finds_nearly_the_optimum() {
 fn refined_results_are_never_worse_and_lie_between_levels() {
     for strategy in [Strategy::Unconstrained, Strategy::Constrained] {
         let lattice = Options { strategy, ..options("exhaustive") };
-        let (coarse, fine) = (run(&lattice), run(&Options { refine: true, ..lattice }));
+        let (coarse, fine) = (truth(strategy), run(&Options { refine: true, ..lattice }));
         assert!(fine.refined && !coarse.refined);
         let mean = |probe: &Probe| probe.entries.iter().map(|e| e.fitness).sum::<f64>();
-        assert!(mean(&fine) < 0.999 * mean(&coarse), "{} {}", mean(&fine), mean(&coarse));
+        assert!(mean(&fine) < 0.999 * mean(coarse), "{} {}", mean(&fine), mean(coarse));
         let between = |e: &lookmatch_remap::Entry| fine.target_axes[2].index_of(e.target[2]).is_none();
         assert!(fine.entries.iter().any(between));
         if strategy == Strategy::Unconstrained {
@@ -139,9 +145,8 @@ fn pairs_replace_what_roles_say() {
         source: source.into(),
         targets: targets.iter().map(|t| (*t).into()).collect(),
     };
-    let with = |pairs: Vec<Pair>| {
-        run(&Options { strategy: Strategy::Constrained, pairs, ..options("exhaustive") })
-    };
+    let with =
+        |pairs: Vec<Pair>| run(&Options { strategy: Strategy::Constrained, pairs, ..options("exhaustive") });
     // A constraint that makes no sense shows that it is heeded: the index may not grow with the specular reflectance.
     let odd = with(vec![pair("specular", &["-ior"])]);
     let indices: HashSet<u64> = odd.entries.iter().map(|e| e.target[1].to_bits()).collect();
@@ -150,7 +155,7 @@ fn pairs_replace_what_roles_say() {
     assert_eq!(odd.pairs, [pair("specular", &["-ior"])]);
     // With nothing paired every point is on its own, but for the switch.
     let free = with(vec![pair("specular", &[]), pair("roughness", &[])]);
-    let alone = run(&options("exhaustive"));
+    let alone = truth(Strategy::Unconstrained);
     assert_eq!(
         free.entries.iter().map(|e| &e.target).collect::<Vec<_>>(),
         alone.entries.iter().map(|e| &e.target).collect::<Vec<_>>()

@@ -71,12 +71,6 @@ impl Syntheses {
         self.families.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Forgets everything: no remap depends on an earlier one.
-    pub(crate) fn clear(&self) {
-        self.families().clear();
-        self.rendered.lock().unwrap_or_else(PoisonError::into_inner).clear();
-    }
-
     /// Counts targets that a search asked for, each once.
     pub(crate) fn count(&self, targets: &[Material]) {
         self.rendered.lock().unwrap_or_else(PoisonError::into_inner).extend(targets.iter().map(key));
