@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use lookmatch_materials::Material;
 use lookmatch_remap::{Probe, RemapError};
 
+use crate::TOLERANCE;
 use crate::TextureError;
-use crate::bake::{Baked, Input, Map, TOLERANCE};
+use crate::bake::{Baked, Input, Map};
 use crate::encoding::{Codes, Encoding, named_srgb};
 use crate::files::{self, Container, Depth, Format, Header, Metadata, Sheet};
 use crate::report::{self, Report};
@@ -35,6 +36,25 @@ pub struct Request<'a> {
     pub band_rows: Option<usize>,
 }
 
+/// What a conversion is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// A table of a target parameter that is carried over, which needs as many points as it takes.
+    Table {
+        /// The parameter.
+        parameter: &'static str,
+        /// Points that are known.
+        points: usize,
+    },
+    /// Rows of all tiles.
+    Rows {
+        /// Rows that are mapped.
+        done: usize,
+        /// Rows in all.
+        total: usize,
+    },
+}
+
 /// A texture with what was found out about it.
 pub(crate) struct Texture {
     pub(crate) tiles: Tiles,
@@ -46,7 +66,7 @@ pub(crate) struct Texture {
 
 /// Maps textures through a probe. The folder has all maps afterwards, or none of them.
 ///
-/// `progress` is told rows done and rows in all. Two source parameters make one map of each target parameter that varies with
+/// Two source parameters make one map of each target parameter that varies with
 /// them; the others are in the report alone, which is `material.json` as well.
 ///
 /// # Errors
@@ -54,12 +74,23 @@ pub(crate) struct Texture {
 /// texels outside the probe's range, unless `clamp`; an end by `stop`.
 pub fn convert(
     request: &Request,
-    progress: &(dyn Fn(usize, usize) + Sync),
+    progress: &(dyn Fn(Progress) + Sync),
+    stop: &AtomicBool,
+) -> Result<Report, TextureError> {
+    converted(request, progress, stop).map_err(|error| match error {
+        TextureError::Interrupted { .. } => TextureError::Interrupted { folder: request.folder.clone() },
+        other => other,
+    })
+}
+
+fn converted(
+    request: &Request,
+    progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
 ) -> Result<Report, TextureError> {
     let base = base(request)?;
     let names: Vec<String> = request.textures.iter().map(|(name, _)| name.clone()).collect();
-    let baked = Baked::new(request.probe, &base, &names)?;
+    let baked = Baked::new(request.probe, &base, &names, progress, stop)?;
     if let Some(twice) =
         baked.inputs.iter().enumerate().find(|(i, a)| baked.inputs[..*i].iter().any(|b| a.name == b.name))
     {
@@ -95,13 +126,7 @@ pub fn convert(
             readings: textures.iter().map(|t| Reading::new(t, *tile)).collect(),
             clamp: request.clamp,
         };
-        let found =
-            stream(&job, &|rows| progress(done + rows, total), stop).map_err(|error| match error {
-                TextureError::Interrupted { .. } => {
-                    TextureError::Interrupted { folder: request.folder.clone() }
-                }
-                other => other,
-            })?;
+        let found = stream(&job, &|rows| progress(Progress::Rows { done: done + rows, total }), stop)?;
         for (texture, seen) in textures.iter_mut().zip(found.inputs) {
             texture.codes = seen.codes;
             texture.outside.add(&seen.outside);
@@ -109,7 +134,7 @@ pub fn convert(
         missing.add(&found.missing);
         written.extend(paths);
         done += height;
-        progress(done, total);
+        progress(Progress::Rows { done, total });
     }
     check_domain(request, &baked, &textures, &missing, &mut notes)?;
     look_at_values(&baked, &textures, &mut notes);

@@ -162,8 +162,7 @@ pub(crate) fn stream(job: &Job, progress: &dyn Fn(usize), stop: &AtomicBool) -> 
         let height = job.size.1;
         for first in (0..height).step_by(job.band_rows) {
             if is_stopped(stop) {
-                // The folder is named by the one who knows it.
-                return Err(TextureError::Interrupted { folder: PathBuf::new() });
+                return Err(TextureError::interrupted());
             }
             let bands = next_bands(&readers, &mut found, job, first)?;
             let is_doomed =

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use lookmatch_remap::Probe;
-use lookmatch_textures::{Encoding, Format, Report, Request, convert};
+use lookmatch_textures::{Encoding, Format, Progress, Report, Request, convert};
 
 use super::apply::{pairs, source};
 use crate::Usage;
 use crate::args::ApplyArgs;
-use crate::output::{bar, print, print_json, table};
+use crate::output::{bar, print, print_json, spinner, table};
 use crate::renderers::interruption;
 
 pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
@@ -37,12 +37,19 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
         band_rows: None,
     };
     let stop = interruption()?;
-    let bar = bar(0, "rows");
-    let progress = |done: usize, total: usize| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
+    let (spinner, bar) = (spinner("reading the probe"), bar(0, "rows"));
+    let progress = |at: Progress| match at {
+        Progress::Table { parameter, points } => {
+            spinner.set_message(format!("table of {parameter}: {points} points"));
+        }
+        Progress::Rows { done, total } => {
+            spinner.finish_and_clear();
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        }
     };
     let report = convert(&request, &progress, &stop);
+    spinner.finish_and_clear();
     bar.finish_and_clear();
     let report = report?;
     for note in &report.notes {
