@@ -60,6 +60,7 @@ fn request<'a>(probe: &'a Probe, textures: &[(&str, PathBuf)], folder: &Path) ->
         probe,
         base: probe.from.clone(),
         textures: textures.iter().map(|(n, p)| ((*n).to_owned(), p.clone())).collect(),
+        channels: Vec::new(),
         encodings: Vec::new(),
         format: None,
         clamp: false,
@@ -399,6 +400,46 @@ fn faults_leave_the_folder_as_it_was() {
     let error = run(&onto_itself).unwrap_err().to_string();
     assert!(error.contains("one of the textures") || error.contains("outside"), "{error}");
     unchanged("a map onto its own texture");
+}
+
+#[test]
+fn a_channel_of_a_packed_texture_is_as_good_as_a_texture_of_its_own() {
+    let probe = probe();
+    let folder = tempfile::tempdir().unwrap();
+    let [unused, roughness, specular] =
+        [[0.0, 1.0], [0.01, 0.69], [0.02, 0.4]].map(|range| random(7, 32 * 32, range));
+    for extension in ["png", "tif", "exr"] {
+        let path = |name: &str| folder.path().join(format!("{name}.{extension}"));
+        let format = ["png16", "tiff16", "exr-half"].into_iter().find(|f| f.starts_with(extension)).unwrap();
+        store(&path("r"), format, 32, vec![roughness.clone()]);
+        store(&path("s"), format, 32, vec![specular.clone()]);
+        store(&path("orm"), format, 32, vec![unused.clone(), roughness.clone(), specular.clone()]);
+        let apart = [("roughness", path("r")), ("specular", path("s"))];
+        let together = [("roughness", path("orm")), ("specular", path("orm"))];
+        let mut maps = Vec::new();
+        for (textures, channels) in
+            [(apart, vec![]), (together, vec![("roughness", Channel::G), ("specular", Channel::B)])]
+        {
+            let mut request = request(&probe, &textures, folder.path());
+            request.channels =
+                channels.into_iter().map(|(name, channel)| (name.to_owned(), channel)).collect();
+            run(&request).unwrap();
+            let found = names(&request.folder).into_iter().filter(|name| name != "material.json");
+            maps.push(found.map(|name| load(&request.folder.join(name)).1).collect::<Vec<Band>>());
+            fs::remove_dir_all(&request.folder).unwrap();
+        }
+        assert!(maps[0].len() == 2 && maps[0] == maps[1], "{extension}");
+        let wrong = |name: &str, file: PathBuf, channel: Channel| {
+            let textures = [(name, file)];
+            let mut request = request(&probe, &textures, folder.path());
+            request.channels = vec![(name.to_owned(), channel)];
+            let error = run(&request).unwrap_err();
+            assert!(error.is_usage() && error.to_string().contains("one channel of several"), "{error}");
+        };
+        wrong("roughness", path("r"), Channel::G);
+        wrong("roughness", path("orm"), Channel::A);
+        wrong("diffuse", path("orm"), Channel::R);
+    }
 }
 
 #[test]

@@ -18,6 +18,6 @@ pub use carried::TOLERANCE;
 pub use convert::{Progress, Request, convert};
 pub use encoding::Encoding;
 pub use error::TextureError;
-pub use files::{Container, Depth, Format};
+pub use files::{Channel, Container, Depth, Format};
 pub use lut::{Between, Lut, LutError, MAX_INPUTS};
 pub use report::Report;

@@ -29,16 +29,20 @@ pub(crate) struct Reading {
     depth: Depth,
     encoding: Encoding,
     channels: usize,
+    /// The plane that is used, if not all of them are.
+    plane: Option<usize>,
     codes: Codes,
 }
 
 impl Reading {
     pub(crate) fn new(texture: &Texture, tile: Option<u32>) -> Self {
+        let plane = texture.channel.and_then(|channel| channel.plane(&texture.header));
         Self {
             path: texture.tiles[&tile].clone(),
             depth: texture.header.format.depth,
             encoding: texture.encoding,
-            channels: texture.header.channels,
+            channels: texture.header.channels.max(plane.map_or(0, |plane| plane + 1)),
+            plane,
             codes: texture.codes.clone(),
         }
     }
@@ -212,6 +216,9 @@ fn reader<'s>(scope: &'s Scope<'s, '_>, reading: &'s Reading, job: &Job) -> Rece
             let mut planes = vec![Vec::new(); reading.channels];
             if let Err(error) = bands.read(first..(first + step).min(height), &mut planes) {
                 return drop(to.send(Err(error)));
+            }
+            if let Some(plane) = reading.plane {
+                planes = vec![planes.swap_remove(plane)];
             }
             for plane in &mut planes {
                 let is_byte = reading.depth == Depth::U8;
