@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bytesize::ByteSize;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lookmatch_materials::Levels;
-use lookmatch_remap::{Assignment, Side, Vary};
+use lookmatch_remap::{Assignment, Pair, Side, Vary};
 
 mod probes;
 
@@ -217,8 +217,8 @@ pub(crate) struct RemapArgs {
     /// How the results of neighbouring source points are used
     #[arg(long, value_enum, default_value = "constrained")]
     pub(crate) strategy: StrategyName,
-    /// genetic, survey, exhaustive, genetic-guarnera2018, genetic-deep2009, or auto: genetic, and survey where the target is a
-    /// model of another renderer
+    /// synthesis (fewest renders), survey, genetic, cma-es, exhaustive, synthesis-half-rate, genetic-guarnera2018,
+    /// genetic-deep2009, or auto: genetic, and survey where the target is a model of another renderer
     #[arg(long, default_value = "auto")]
     pub(crate) search: String,
     /// Lattice of a parameter; without `source.` or `target.` before the name, the source's if it has one
@@ -227,6 +227,13 @@ pub(crate) struct RemapArgs {
     /// Hold a parameter at a value; the name as in --vary
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     pub(crate) fix: Vec<Assignment>,
+    /// Which target parameters follow a source parameter in a constrained remap, instead of those that roles pair with it:
+    /// roughness=roughness, gloss=-roughness (it falls), specular=ior,specular, or specular= (nothing follows)
+    #[arg(long, value_name = "SOURCE=TARGET", value_parser = pair)]
+    pub(crate) pair: Vec<Pair>,
+    /// Polish each result between the levels of the lattice; it never ends worse
+    #[arg(long)]
+    pub(crate) refine: bool,
     /// Target ranges, instead of those that the source needs
     #[arg(long, value_enum)]
     pub(crate) preset: Option<PresetName>,
@@ -411,6 +418,13 @@ pub(crate) fn vary(text: &str) -> Result<Vary, String> {
     let [min, max, step] = numbers[..] else { return Err(wrong()) };
     let (side, name) = side(name.trim());
     Ok(Vary { side, name, levels: Levels::new(min, max, step) })
+}
+
+/// Reads `SOURCE=TARGET,TARGET`.
+fn pair(text: &str) -> Result<Pair, String> {
+    let (source, targets) = text.split_once('=').ok_or("expected SOURCE=TARGET")?;
+    let targets = targets.split(',').map(str::trim).filter(|name| !name.is_empty());
+    Ok(Pair { source: source.trim().to_owned(), targets: targets.map(str::to_owned).collect() })
 }
 
 fn assignment(text: &str) -> Result<Assignment, String> {

@@ -90,6 +90,28 @@ impl NoisyLab {
         Self { first, second, smooth, compressed }
     }
 
+    /// L*, a* and b* of the smoothed mean, one plane after the other.
+    pub fn planes(&self) -> Vec<f32> {
+        let pixels = self.compressed[0].len();
+        let mut planes = vec![0.0; 3 * pixels];
+        for k in 0..pixels {
+            let value = lab(std::array::from_fn(|c| self.compressed[c][k]));
+            (0..3).for_each(|c| planes[c * pixels + k] = value[c]);
+        }
+        planes
+    }
+
+    /// [`NoisyLab::planes`] of a picture between two others; `share` is that of the second.
+    pub fn planes_between(&self, other: &Self, share: f32) -> Vec<f32> {
+        let mixed = |c: usize| {
+            let pairs = self.smooth[c].iter().zip(&other.smooth[c]);
+            pairs.map(|(a, b)| compress(a + share * (b - a))).collect::<Vec<f32>>()
+        };
+        let compressed: [Vec<f32>; 3] = std::array::from_fn(mixed);
+        let none = || std::array::from_fn(|_| Vec::new());
+        Self { first: none(), second: None, smooth: none(), compressed }.planes()
+    }
+
     /// The sum of squared ΔE*76 between two pictures without their noise, each pixel's difference times its weight.
     ///
     /// # Panics

@@ -31,6 +31,9 @@ pub struct Description {
     pub surveyed: Vec<String>,
     /// What a remap searches.
     pub searched: Vec<String>,
+    /// In what pictures are linear, as [`Model::linear`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub linear: Vec<String>,
 }
 
 /// A parameter as another renderer describes it.
@@ -116,10 +119,12 @@ impl Description {
                 return Err(format!("parameter '{}' is described twice", parameter.name));
             }
         }
-        for named in self.surveyed.iter().chain(&self.searched) {
+        for named in self.surveyed.iter().chain(&self.searched).chain(&self.linear) {
             let found = parameters.iter().find(|p| p.name == named);
             if found.is_none_or(|p| p.range().is_none()) {
-                return Err(format!("'{named}', to be surveyed or searched, is no number or colour of it"));
+                return Err(format!(
+                    "'{named}', to be surveyed, searched or linear, is no number or colour of it"
+                ));
             }
         }
         let texts =
@@ -135,6 +140,7 @@ impl Description {
             parameters: leaked(parameters),
             surveyed: texts(&self.surveyed),
             searched: texts(&self.searched),
+            linear: texts(&self.linear),
             ..Model::BLANK
         })))
     }

@@ -101,6 +101,9 @@ pub struct Model {
     /// The parameters or aliases that a remap searches by default when the model is the target; none where the model can
     /// only be a source.
     pub searched: &'static [&'static str],
+    /// The parameters in each of which the BSDF is linear (affine) while all others stay as they are, formulas as they are by
+    /// default: pictures at two of its values then tell those at all others. A test holds it against random materials.
+    pub linear: &'static [&'static str],
     /// Materials with names of their own.
     #[serde(skip)]
     pub presets: fn() -> &'static [Preset],
@@ -138,6 +141,7 @@ impl Model {
         named: &[],
         surveyed: &[],
         searched: &[],
+        linear: &[],
         presets: || &[],
         diffuse_only: None,
         check: |_| Ok(()),

@@ -268,3 +268,79 @@ fn largest_albedos() {
         println!("{}: {:.4}  {}", model.name, largest.0, largest.1);
     }
 }
+
+/// Two values of a parameter and the one halfway between them.
+fn halfway(parameter: &lookmatch_materials::Parameter, u: f64, v: f64) -> Option<[Value; 3]> {
+    let number = |range: &lookmatch_materials::Range| {
+        let (min, max) = (range.plausible.min.max(0.02), range.plausible.max);
+        let (low, high) = (min + 0.4 * u * (max - min), max - 0.4 * v * (max - min));
+        [low, high, (low + high) / 2.0]
+    };
+    match &parameter.kind {
+        Kind::Number { range, .. } => Some(number(range).map(Value::Number)),
+        Kind::List { range, .. } => Some(number(range).map(|v| Value::List([v].into()))),
+        Kind::Colour { .. } => {
+            let (low, high) = ([0.1 * u, 0.3, 0.9], [0.9, 0.8 * v, 0.2]);
+            Some([low, high, std::array::from_fn(|c| (low[c] + high[c]) / 2.0)].map(Value::Colour))
+        }
+        Kind::Choice { .. } | Kind::File { .. } => None,
+    }
+}
+
+/// Whether the BSDF halfway between two values of a parameter is halfway between their BSDFs, and whether it changes at all.
+fn is_linear(model: &'static Model, index: usize, draw: &mut dyn FnMut() -> f64) -> [bool; 2] {
+    let (mut linear, mut changes) = (true, false);
+    for round in 0..4 {
+        if !linear {
+            break;
+        }
+        let numbers: Vec<f64> = (0..29).map(|_| draw()).collect();
+        // Random lobes may be too narrow, or turned away, to be met by chance.
+        let material =
+            if round == 0 { Material::new(model) } else { by_default_formulas(material(model, &numbers)) };
+        let Some(values) = halfway(&model.parameters[index], draw(), draw()) else { return [false; 2] };
+        let bsdf = |value: Value| {
+            let mut changed = material.clone();
+            changed.set_value(index, value).unwrap();
+            changed.bsdf()
+        };
+        let bsdfs = values.map(bsdf);
+        for _ in 0..6 {
+            // Near the mirror direction, where every lobe has something to say.
+            let (cos, phi) = (0.1 + 0.85 * draw(), TAU * draw());
+            let wi =
+                direction((cos + 0.1 * (draw() - 0.5)).clamp(0.05, 1.0), phi + PI + 0.2 * (draw() - 0.5));
+            let Some(g) = Geometry::new(wi, direction(cos, phi)) else { continue };
+            for part in [
+                |b: &dyn Bsdf, _: &Geometry<f64>| b.diffuse(),
+                |b: &dyn Bsdf, g: &Geometry<f64>| b.specular(g),
+            ] {
+                let [a, b, m] = [0, 1, 2].map(|k| part(&*bsdfs[k], &g));
+                let largest = a.iter().chain(&b).fold(0.0f64, |most, v| most.max(*v));
+                linear &= (0..3).all(|c| (m[c] - (a[c] + b[c]) / 2.0).abs() <= 1e-9 * largest);
+                changes |= (0..3).any(|c| (a[c] - b[c]).abs() > 1e-6 * largest);
+            }
+        }
+    }
+    [linear, changes]
+}
+
+#[test]
+fn models_are_linear_in_what_they_declare_and_search_nothing_linear_unaware() {
+    let mut numbers = (0..).map(|k| (0.5 + 0.618_033_988_75 * f64::from(k)).fract());
+    let mut draw = || numbers.next().unwrap();
+    let mut declared = 0;
+    for model in registry().iter().filter(|model| model.load.is_none()) {
+        let index = |name: &&str| model.parameters.iter().position(|p| p.name == *name);
+        for name in model.linear {
+            let found = is_linear(model, index(&name).expect("a parameter"), &mut draw);
+            assert_eq!(found, [true; 2], "{} in {name}", model.name);
+            declared += 1;
+        }
+        for name in model.searched.iter().filter(|name| !model.linear.contains(name)) {
+            let is_used = index(name).is_some_and(|index| is_linear(model, index, &mut draw) == [true; 2]);
+            assert!(!is_used, "{} is linear in {name}, and does not say so", model.name);
+        }
+    }
+    assert!(declared > 20, "{declared}");
+}

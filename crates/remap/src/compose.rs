@@ -53,7 +53,7 @@ pub fn compose(first: &Probe, second: &Probe, clamp: bool) -> Result<Probe, Rema
         held: second.held.clone(),
         search: "composition".into(),
         strategy: if is_constrained { Strategy::Constrained } else { Strategy::Unconstrained },
-        totals: Totals { evaluations: 0, lattice_points: target_axes.iter().map(Axis::len).product() },
+        totals: Totals::derived(&target_axes),
         target_axes,
         renderers,
         entries: places.iter().map(|place| entries[*place].clone()).collect(),

@@ -17,14 +17,15 @@ use lru::LruCache;
 use rayon::prelude::*;
 
 use crate::carry::{Body, SourceLook};
-use crate::cross_match::{CrossMatch, Settled};
+use crate::cross_match::{CrossMatch, Foresight, Settled};
 use crate::from_pictures::Pictures;
-use crate::gallery::{Key, key};
+use crate::gallery::{Key, family, key};
 use crate::picture_checks::check_pictures;
 use crate::probe::Noise;
 use crate::stage::LIGHTS;
 use crate::strategy::Matched;
 use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
+use crate::synthesis::Pictures as Planar;
 use crate::{Entry, Plan, RemapError, Stage};
 
 /// Names of the reference scene under its lights, point and environment.
@@ -347,6 +348,26 @@ impl CrossStage {
         planes
     }
 
+    /// The pictures of a look, weighted per pixel: specular and perhaps diffuse ones under both lights.
+    pub(crate) fn pictures(&self, look: &Look, with_diffuse: bool) -> Planar {
+        let diffuse = look.diffuse.as_ref().filter(|_| with_diffuse).map(|diffuse| &diffuse.images);
+        let images = look.specular.iter().chain(diffuse.into_iter().flatten());
+        images.map(|image| self.weighted(image.planes())).collect()
+    }
+
+    /// The pictures of a look between two others.
+    pub(crate) fn mixed_pictures(&self, a: &Look, b: &Look, share: f64, with_diffuse: bool) -> Planar {
+        let diffuse = a.diffuse.as_ref().zip(b.diffuse.as_ref()).filter(|_| with_diffuse);
+        let diffuse = diffuse.map(|(a, b)| a.images.iter().zip(&b.images));
+        let pairs = a.specular.iter().zip(&b.specular).chain(diffuse.into_iter().flatten());
+        pairs.map(|(a, b)| self.weighted(a.planes_between(b, share as f32))).collect()
+    }
+
+    fn weighted(&self, mut lab: Vec<f32>) -> Vec<f32> {
+        lab.iter_mut().zip(self.weights.iter().cycle()).for_each(|(v, w)| *v *= w);
+        lab
+    }
+
     /// Weighted mean of diffuse pictures under the environment.
     pub(crate) fn level(&self, halves: &[Planes]) -> [f64; 3] {
         let total = halves.len() as f64 * self.weights.iter().copied().map(f64::from).sum::<f64>();
@@ -438,12 +459,16 @@ impl CrossStage {
         let level = seen.level();
         let rounded = self.carried(&source, level)?.rounded_albedo();
         let with_diffuse = plan.to.model().renderer.is_none();
+        let body = if with_diffuse { Body::Matched } else { Body::Copied };
+        let foresight =
+            family(plan, &rounded, body)?.map(|family| Foresight { seen: &seen, with_diffuse, family });
         let mut objective = CrossMatch {
             plan,
             stage: self,
             lattice: problem.lattice,
             source: rounded,
             score: &|look| self.score(&seen, look, with_diffuse),
+            foresight,
             scores: HashMap::new(),
             stop,
         };

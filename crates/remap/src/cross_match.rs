@@ -9,15 +9,18 @@ use rayon::prelude::*;
 
 use crate::carry::{Body, SourceLook};
 use crate::cross::{Look, Score};
-use crate::gallery::{Stopped, stopped};
+use crate::gallery::{Key, Stopped, stopped};
 use crate::settle::Bowl;
 use crate::strategy::{Counting, searched};
+use crate::synthesis::{Rendered, Synthesis, is_linear};
 use crate::{CrossStage, Plan, RemapError};
 
 /// Fitness of a candidate that could not be rendered: worse than any picture can be.
 const FAILED: f64 = 1e9;
 /// Bowls that are looked into before a search gives up to find the bottom.
 const ROUNDS: usize = 4;
+/// Compared points that tell what noise adds to a distance.
+const CALIBRATING: usize = 4;
 /// Levels of the last step of a search among noisy candidates.
 const LAST_STEP: u32 = 4;
 
@@ -29,6 +32,15 @@ pub(crate) struct Settled {
     pub(crate) samples: u32,
 }
 
+/// What forecasts of a source's matches are made with.
+pub(crate) struct Foresight<'a> {
+    /// The source.
+    pub(crate) seen: &'a Look,
+    pub(crate) with_diffuse: bool,
+    /// What its targets have in common.
+    pub(crate) family: Key,
+}
+
 /// The fitness of target points against one source.
 pub(crate) struct CrossMatch<'a> {
     pub(crate) plan: &'a Plan,
@@ -37,6 +49,8 @@ pub(crate) struct CrossMatch<'a> {
     pub(crate) source: SourceLook<'a>,
     /// How far a look is from the source's.
     pub(crate) score: &'a (dyn Fn(&Look) -> Score + Sync),
+    /// What forecasts need, where the search asks for them.
+    pub(crate) foresight: Option<Foresight<'a>>,
     /// Points that were compared so far.
     pub(crate) scores: HashMap<Point, f64>,
     pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
@@ -55,12 +69,39 @@ impl CrossMatch<'_> {
 
     /// Scores of points at a number of samples; those that cannot be rendered score [`FAILED`].
     fn scored(&self, points: &[Point], samples: u32) -> Result<Vec<Score>, RemapError> {
-        let looks = self.stage.looks(&self.targets(points)?, false, samples);
+        let targets = self.targets(points)?;
+        self.stage.own.syntheses.count(&targets);
+        let looks = self.stage.looks(&targets, false, samples);
+        if let Some(foresight) = &self.foresight {
+            self.learn(foresight, points, &looks);
+        }
         let score = |look: Result<Arc<Look>, String>| match look {
             Ok(look) => (self.score)(&look),
             Err(_) => Score { value: FAILED, error: 0.0 },
         };
         Ok(looks.into_par_iter().map(score).collect())
+    }
+
+    /// Hands rendered targets to the synthesis of their family.
+    fn learn(&self, foresight: &Foresight, points: &[Point], looks: &[Result<Arc<Look>, String>]) {
+        let (stage, with_diffuse) = (self.stage, foresight.with_diffuse);
+        let mut families = stage.own.syntheses.families();
+        let synthesis = families.entry(foresight.family.clone()).or_insert_with(|| {
+            let mut shares = stage.own.picture_shares();
+            shares.truncate(if with_diffuse { 4 } else { 2 });
+            Synthesis::new(self.plan.to.model(), self.lattice, shares)
+        });
+        let new = points.iter().zip(looks).filter(|(point, _)| !synthesis.knows(point));
+        let new: Vec<(&Point, &Look)> =
+            new.filter_map(|(point, look)| Some((point, &**look.as_ref().ok()?))).collect();
+        let rendered = |(point, look): &(&Point, &Look)| Rendered {
+            point: (*point).clone(),
+            pictures: stage.pictures(look, with_diffuse),
+        };
+        let rendered: Vec<Rendered> = new.iter().map(rendered).collect();
+        let mix =
+            |a: usize, b: usize, share: f64| stage.mixed_pictures(new[a].1, new[b].1, share, with_diffuse);
+        synthesis.learn(&rendered, &mix);
     }
 
     /// The best point, and whether noise leaves no doubt of it.
@@ -134,6 +175,29 @@ impl Objective for CrossMatch<'_> {
         }
         self.scores.extend(points.iter().cloned().zip(scores.iter().map(|score| score.value)));
         Ok(scores.into_iter().map(|score| score.value).collect())
+    }
+
+    /// Pictures with noise are further apart than what they show: by as much as the best of those that were compared are.
+    fn forecast(&mut self, points: &[Point]) -> Option<Vec<f64>> {
+        let foresight = self.foresight.as_ref()?;
+        let mut families = self.stage.own.syntheses.families();
+        let synthesis = families.get_mut(&foresight.family)?;
+        let seen = synthesis.seen(&self.stage.pictures(foresight.seen, foresight.with_diffuse));
+        let mut best: Vec<(&Point, f64)> =
+            self.scores.iter().filter(|(_, v)| **v < FAILED).map(|(p, v)| (p, *v)).collect();
+        best.sort_by(|a, b| a.1.total_cmp(&b.1).then_with(|| a.0.cmp(b.0)));
+        best.truncate(CALIBRATING);
+        let known: Vec<Point> = best.iter().map(|(point, _)| (*point).clone()).collect();
+        let foreseen = synthesis.distances(&seen, &known)?;
+        let excess =
+            |((_, score), distance): (&(&Point, f64), &f64)| distance * distance - score * score.abs();
+        let excess = best.iter().zip(&foreseen).map(excess).sum::<f64>() / best.len().max(1) as f64;
+        let distances = synthesis.distances(&seen, points)?;
+        Some(distances.into_iter().map(|d| (d * d - excess).abs().sqrt().copysign(d * d - excess)).collect())
+    }
+
+    fn is_linear(&self, axis: usize) -> bool {
+        is_linear(self.plan.to.model(), &self.lattice.axes[axis])
     }
 }
 

@@ -345,6 +345,7 @@ impl<'a> Round<'a> {
             lattice,
             source: self.source(),
             score: &|look| self.score(look),
+            foresight: None,
             scores: HashMap::new(),
             stop,
         };

@@ -1,5 +1,6 @@
 //! Materials that were rendered already: the paper's database of renderings, in memory and bounded.
 
+use std::cell::OnceCell;
 use std::collections::HashSet;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,8 +10,9 @@ use lookmatch_search::{Lattice, Objective, ObjectiveError, Point, SearchError};
 use lru::LruCache;
 use rayon::prelude::*;
 
-use crate::carry::SourceLook;
+use crate::carry::{Body, SourceLook};
 use crate::stage::{Appearance, Stage};
+use crate::synthesis::{Rendered, Synthesis, is_linear};
 use crate::{Plan, RemapError};
 
 /// Memory for kept appearances, in bytes.
@@ -83,6 +85,8 @@ pub(crate) struct Match<'a> {
     pub(crate) appearance: &'a Appearance,
     /// Points that were compared so far, also by an earlier search of the same source.
     pub(crate) compared: HashSet<Point>,
+    /// The family of its targets, where pictures are synthesised.
+    pub(crate) family: Option<Key>,
     /// Asked before each batch; true stops the search.
     pub(crate) stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -92,6 +96,30 @@ pub(crate) struct Match<'a> {
 #[error("stopped")]
 pub(crate) struct Stopped;
 
+impl Match<'_> {
+    /// Hands rendered targets to the synthesis of their family.
+    fn learn(&self, family: &Key, points: &[Point], targets: &[Material], seen: &[Arc<Appearance>]) {
+        let mut families = self.stage.syntheses.families();
+        let synthesis = families.entry(family.clone()).or_insert_with(|| {
+            Synthesis::new(self.plan.to.model(), self.lattice, self.stage.picture_shares())
+        });
+        let new: Vec<usize> = (0..points.len()).filter(|k| !synthesis.knows(&points[*k])).collect();
+        let rendered =
+            |k: &usize| Rendered { point: points[*k].clone(), pictures: self.stage.pictures(&seen[*k]) };
+        let rendered: Vec<Rendered> = new.iter().map(rendered).collect();
+        // Only what lies between linear pictures needs them.
+        let planes = OnceCell::new();
+        let mix = |a: usize, b: usize, share: f64| {
+            let planes = planes.get_or_init(|| {
+                let targets: Vec<Material> = new.iter().map(|k| targets[*k].clone()).collect();
+                self.stage.linear_planes(&targets)
+            });
+            self.stage.mixed_pictures([&planes[a], &planes[b]], share)
+        };
+        synthesis.learn(&rendered, &mix);
+    }
+}
+
 impl Objective for Match<'_> {
     fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, ObjectiveError> {
         if (self.stop)() {
@@ -100,12 +128,34 @@ impl Objective for Match<'_> {
         self.compared.extend(points.iter().cloned());
         let material = |p: &Point| self.plan.target_beside(&self.source, &self.lattice.values(p));
         let targets = points.iter().map(material).collect::<Result<Vec<_>, RemapError>>()?;
+        self.stage.syntheses.count(&targets);
         let seen = self.stage.known_appearances(&targets);
+        if let Some(family) = &self.family {
+            self.learn(family, points, &targets, &seen);
+        }
         Ok(seen.par_iter().map(|seen| self.stage.fitness(self.appearance, seen)).collect())
+    }
+
+    fn forecast(&mut self, points: &[Point]) -> Option<Vec<f64>> {
+        let mut families = self.stage.syntheses.families();
+        let synthesis = families.get_mut(self.family.as_ref()?)?;
+        let seen = synthesis.seen(&self.stage.pictures(self.appearance));
+        synthesis.distances(&seen, points)
+    }
+
+    fn is_linear(&self, axis: usize) -> bool {
+        is_linear(self.plan.to.model(), &self.lattice.axes[axis])
     }
 }
 
 /// The error of work that was stopped from outside.
 pub(crate) fn stopped() -> RemapError {
     RemapError::Search(SearchError::Objective(Box::new(Stopped)))
+}
+
+/// What targets of a source have in common: everything but what is searched.
+pub(crate) fn family(plan: &Plan, source: &SourceLook, body: Body) -> Result<Option<Key>, RemapError> {
+    let first: Vec<f64> = plan.target_axes.iter().map(|axis| axis.value(axis.len() - 1)).collect();
+    let is_synthesised = plan.search.starts_with("synthesis");
+    is_synthesised.then(|| Ok(key(&plan.target_with(source, &first, body)?))).transpose()
 }

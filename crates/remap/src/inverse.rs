@@ -67,7 +67,7 @@ pub fn invert(probe: &Probe) -> Result<Probe, RemapError> {
         source_axes: from_axes,
         held: Vec::new(),
         search: "inverse".into(),
-        totals: Totals { evaluations: 0, lattice_points: target_axes.iter().map(Axis::len).product() },
+        totals: Totals::derived(&target_axes),
         target_axes,
         entries: found.into_iter().map(|(entry, _)| entry).collect(),
         fit: None,

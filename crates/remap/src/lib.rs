@@ -26,10 +26,12 @@ mod picture_checks;
 mod plan;
 mod probe;
 mod projection;
+mod refine;
 mod settle;
 mod stage;
 mod strategy;
 mod studio;
+mod synthesis;
 mod table;
 mod validate;
 
@@ -48,7 +50,7 @@ pub use from_pictures::{PictureMatch, Pictures, match_pictures};
 pub use inverse::{Reach, invert};
 pub use journal::journal_path;
 pub use losses::{Loss, LossClass, losses};
-pub use options::{Assignment, Endpoint, Options, Preset, Side, Strategy, Vary};
+pub use options::{Assignment, Endpoint, Options, Pair, Preset, Side, Strategy, Vary};
 pub use pairs::{PairScore, score_pair};
 pub use picture_checks::{PictureCheck, Suspicion, check_pictures};
 pub use plan::Plan;
@@ -56,6 +58,7 @@ pub use probe::{Derived, DerivedKind, Entry, Flag, Metric, Noise, Probe, RoundTr
 pub use stage::{Appearance, Stage};
 pub use strategy::{Event, remap, remap_across};
 pub use studio::{Counts, RendererRecord, Sampling, Shot, Studio};
+pub use synthesis::SynthesisRecord;
 pub use validate::{
     Lighting, MethodScores, Scores, Statistics, ValidationReport, Validator, validation_points,
 };

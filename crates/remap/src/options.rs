@@ -1,6 +1,7 @@
 //! What a user may choose of a remap.
 
-use lookmatch_materials::{Levels, Material, Model};
+use lookmatch_materials::{Levels, Material, Model, Trend};
+use lookmatch_search::Axis;
 use serde::{Deserialize, Serialize};
 
 use crate::RemapError;
@@ -58,6 +59,50 @@ pub struct Assignment {
     pub value: String,
 }
 
+/// Which target parameters follow a source parameter in a constrained remap, instead of those with a role that corresponds.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Pair {
+    /// An axis of the source.
+    pub source: String,
+    /// Axes of the target, those that fall while it rises with a `-` before the name; none where nothing follows it.
+    pub targets: Vec<String>,
+}
+
+impl Pair {
+    /// Places of the axes that follow, and how: as a name says, or else as the roles do, or rising.
+    pub(crate) fn followers(
+        &self,
+        axes: &[Axis],
+        trend: impl Fn(usize) -> Option<Trend>,
+    ) -> Vec<(usize, Trend)> {
+        let follower = |name: &String| {
+            let bare = name.strip_prefix('-').unwrap_or(name);
+            let place = axes.iter().position(|axis| axis.name == bare)?;
+            let falling = name.starts_with('-').then_some(Trend::Falling);
+            Some((place, falling.or_else(|| trend(place)).unwrap_or(Trend::Rising)))
+        };
+        self.targets.iter().filter_map(follower).collect()
+    }
+
+    /// Refuses what is no axis.
+    pub(crate) fn check(&self, source: &[Axis], target: &[Axis]) -> Result<(), RemapError> {
+        let known = |axes: &[Axis]| axes.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", ");
+        let wrong = |side: &str, name: &str, axes: &[Axis]| {
+            let shown = format!("'{name}' in --pair is none of the {side}'s axes ({})", known(axes));
+            RemapError::Option(shown)
+        };
+        let has = |axes: &[Axis], name: &str| axes.iter().any(|axis| axis.name == name);
+        if !has(source, &self.source) {
+            return Err(wrong("source", &self.source, source));
+        }
+        let bare = |name: &String| name.strip_prefix('-').unwrap_or(name).to_owned();
+        match self.targets.iter().map(bare).find(|name| !has(target, name)) {
+            Some(name) => Err(wrong("target", &name, target)),
+            None => Ok(()),
+        }
+    }
+}
+
 /// What a user may choose.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -79,6 +124,10 @@ pub struct Options {
     pub quick: bool,
     /// Side of the pictures in pixels, where it is not to be the usual one.
     pub size: Option<usize>,
+    /// Which target parameters follow which source parameters, where roles are not to decide.
+    pub pairs: Vec<Pair>,
+    /// Polish each result between the levels of the lattice.
+    pub refine: bool,
     /// Samples of the pictures of other renderers.
     pub sampling: Sampling,
     /// The renderers that are at hand.
@@ -97,6 +146,8 @@ impl Default for Options {
             mask: false,
             quick: false,
             size: None,
+            pairs: Vec::new(),
+            refine: false,
             sampling: Sampling::default(),
             renderers: Vec::new(),
         }

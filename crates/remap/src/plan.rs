@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::RemapError;
 use crate::carry::{Body, SourceLook, carry_over};
 use crate::draft::{Draft, highest_f0, pick, thinned};
-use crate::options::{AUTO, Endpoint, Options, Preset, Side, Strategy};
+use crate::options::{AUTO, Endpoint, Options, Pair, Preset, Side, Strategy};
 use crate::studio::{RendererRecord, Sampling};
 
 /// A remap, fully determined: two equal plans give equal probes.
@@ -42,6 +42,12 @@ pub struct Plan {
     pub scene: Scene,
     /// Side of its pictures in pixels.
     pub size: usize,
+    /// Which target parameters follow which source parameters, where roles do not decide.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<Pair>,
+    /// True where results are polished between the levels of the lattice.
+    #[serde(default)]
+    pub refine: bool,
     /// Samples of the pictures of other renderers, where there are some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
@@ -139,6 +145,7 @@ impl Plan {
         if options.quick {
             source.axes.iter_mut().for_each(|axis| *axis = thinned(axis));
         }
+        options.pairs.iter().try_for_each(|pair| pair.check(&source.axes, &target.axes))?;
         let is_foreign = from.renderer.is_some() || to.renderer.is_some();
         let takes_part = |record: &&RendererRecord| {
             [from, to].iter().any(|model| model.renderer == Some(record.name.as_str()))
@@ -157,6 +164,8 @@ impl Plan {
             seed: options.seed,
             metric: Fitness::default(),
             mask: options.mask,
+            pairs: options.pairs.clone(),
+            refine: options.refine,
             scene: Scene::reference(),
             size: options.size.unwrap_or(match (is_foreign, options.quick) {
                 // Pictures of other renderers take seconds, and as many times longer as they have pixels.

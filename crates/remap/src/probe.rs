@@ -10,9 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::carry::{Body, SourceLook, carry_over};
 use crate::fit::Fit;
-use crate::options::{Preset, Strategy};
+use crate::options::{Pair, Preset, Strategy};
 use crate::plan::Plan;
 use crate::studio::{RendererRecord, Sampling};
+use crate::synthesis::SynthesisRecord;
 use crate::{RemapError, plan};
 
 /// Version of the file format that is written; older ones are read, newer ones refused.
@@ -48,6 +49,12 @@ pub struct Probe {
     pub preset: Option<Preset>,
     /// Seed.
     pub seed: u64,
+    /// Which target parameters followed which source parameters, where roles did not decide.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<Pair>,
+    /// True where targets may lie between the levels of the target axes.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refined: bool,
     /// What was minimised.
     pub metric: Metric,
     /// The scene that was compared.
@@ -151,6 +158,21 @@ pub struct Totals {
     pub evaluations: usize,
     /// Points of the target lattice.
     pub lattice_points: usize,
+    /// Distinct target materials that were rendered for these comparisons since the remap was last resumed; absent in older
+    /// files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rendered: Option<usize>,
+    /// How far synthesised pictures could be trusted, where there were any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub synthesis: Option<SynthesisRecord>,
+}
+
+impl Totals {
+    /// Of a probe that no search found.
+    pub(crate) fn derived(target_axes: &[Axis]) -> Self {
+        let lattice_points = target_axes.iter().map(Axis::len).product();
+        Self { evaluations: 0, lattice_points, rendered: None, synthesis: None }
+    }
 }
 
 /// The result for one source point.
@@ -227,6 +249,8 @@ impl Probe {
             search: plan.search.clone(),
             preset: plan.preset,
             seed: plan.seed,
+            pairs: plan.pairs.clone(),
+            refined: plan.refine,
             metric: Metric {
                 name: "guarnera-2018-eq3".into(),
                 space: plan.metric.space,
@@ -238,7 +262,7 @@ impl Probe {
             size: plan.size,
             sampling: plan.sampling,
             renderers: plan.renderers.clone(),
-            totals: Totals { evaluations, lattice_points },
+            totals: Totals { evaluations, lattice_points, rendered: None, synthesis: None },
             derived: None,
             fit: None,
             entries,
@@ -387,8 +411,8 @@ impl Probe {
                 return Err(format!("entry {place} is of the source point {:?}, out of order", entry.source));
             }
             let is_on = |(axis, v): (&Axis, &f64)| match self.derived {
-                None => axis.index_of(*v).is_some(),
-                Some(_) => (axis.value(0)..=axis.value(axis.len() - 1)).contains(v),
+                None if !self.refined => axis.index_of(*v).is_some(),
+                _ => (axis.value(0)..=axis.value(axis.len() - 1)).contains(v),
             };
             let on_lattice = self.target_axes.iter().zip(&entry.target).all(is_on);
             if !on_lattice {

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::gallery::Gallery;
 use crate::projection::{Projection, Sketches};
+use crate::synthesis::{Pictures, Syntheses};
 use crate::{Plan, RemapError};
 
 /// What the metric knows of a material: its specular and diffuse images under both lights in CIELAB, on the subject's
@@ -44,6 +45,8 @@ pub struct Stage {
     gallery: Gallery,
     /// The diffuse images of appearances that still exist.
     diffuse: Mutex<HashMap<DiffuseKey, Weak<Images>>>,
+    /// What synthesis made of rendered targets.
+    pub(crate) syntheses: Syntheses,
 }
 
 impl Stage {
@@ -97,7 +100,7 @@ impl Stage {
         let weights = mask.then(|| on_subject(point.mask().weights()));
         let diffuse = Mutex::new(HashMap::new());
         let gallery = Gallery::new(appearance_bytes(&point));
-        Ok(Self { metric, weights, gallery, diffuse, point, environment })
+        Ok(Self { metric, weights, gallery, diffuse, point, environment, syntheses: Syntheses::default() })
     }
 
     /// Renders materials, on all cores, in their order.
@@ -171,6 +174,40 @@ impl Stage {
     /// Mask weights on the subject's pixels, where there is a mask.
     pub(crate) fn mask_weights(&self) -> Option<&[f32]> {
         self.weights.as_deref()
+    }
+
+    /// What a unit of distance between two pictures adds to the fitness, in the order of [`Stage::pictures`].
+    pub(crate) fn picture_shares(&self) -> Vec<f64> {
+        self.part_weights().as_flattened().iter().map(|weight| weight / self.point.size() as f64).collect()
+    }
+
+    /// The pictures of an appearance, weighted per pixel: specular and diffuse ones under both lights.
+    pub(crate) fn pictures(&self, seen: &Appearance) -> Pictures {
+        let images = [&seen.specular, &*seen.diffuse];
+        images
+            .into_iter()
+            .flat_map(|i| [&i.point, &i.environment])
+            .map(|lab| self.weighted(lab.clone()))
+            .collect()
+    }
+
+    /// The pictures of a material whose BSDF lies between two others, given their linear planes and the share of the second.
+    pub(crate) fn mixed_pictures(&self, [a, b]: [&[[Planes; 2]; 2]; 2], share: f64) -> Pictures {
+        let share = share as f32;
+        let mixed =
+            |(a, b): (&Vec<f32>, &Vec<f32>)| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
+        let picture = |part: usize, light: usize| {
+            let (a, b) = (&a[part][light], &b[part][light]);
+            self.weighted(lab(&std::array::from_fn(|c| mixed((&a[c], &b[c])))))
+        };
+        vec![picture(0, 0), picture(0, 1), picture(1, 0), picture(1, 1)]
+    }
+
+    fn weighted(&self, mut lab: Vec<f32>) -> Vec<f32> {
+        if let Some(weights) = &self.weights {
+            lab.iter_mut().zip(weights.iter().cycle()).for_each(|(v, w)| *v *= w);
+        }
+        lab
     }
 
     /// Linear planes of materials: for each of them the specular (0) and the diffuse (1) picture, by light.

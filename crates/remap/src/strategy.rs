@@ -10,9 +10,11 @@ use lookmatch_search::{
 };
 use rayon::prelude::*;
 
-use crate::carry::SourceLook;
-use crate::gallery::{Match, Stopped, stopped};
+use crate::carry::{Body, SourceLook};
+use crate::gallery::{Match, Stopped, family, stopped};
 use crate::journal::Journal;
+use crate::refine::{self, Led};
+use crate::synthesis::Syntheses;
 use crate::table::{BATCH, FitnessTable, Found, Task};
 use crate::{CrossStage, Entry, Plan, Probe, RemapError, Stage, Strategy};
 
@@ -117,6 +119,51 @@ impl<'a> From<Own<'a>> for Eye<'a> {
 }
 
 impl Eye<'_> {
+    /// What it knows of targets.
+    fn syntheses(&self) -> &Syntheses {
+        match self {
+            Self::Own(Own { stage, .. }) => &stage.syntheses,
+            Self::Cross(stage) => &stage.own.syntheses,
+        }
+    }
+
+    /// A match between the levels of the lattice, if the plan wants it.
+    fn refined(
+        &self,
+        plan: &Plan,
+        lattice: &Lattice,
+        matched: Matched,
+        (pairing, led): (&Pairing, &Led),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Matched, RemapError> {
+        let Self::Own(Own { stage, .. }) = self else { return Ok(matched) };
+        if !plan.refine || matched.entry.failed.is_some() {
+            return Ok(matched);
+        }
+        let (fine, centre) = refine::around(lattice, &matched.best, led);
+        let source = plan.source_material(&matched.entry.source)?;
+        let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
+        let (look, compared) = (SourceLook::new(&source), HashSet::new());
+        let mut objective =
+            Match { plan, stage, lattice: &fine, source: look, appearance, compared, family: None, stop };
+        let (values, fitness) = refine::descend(&fine, centre, plan.seed, &mut objective)?;
+        if fitness >= matched.entry.fitness {
+            return Ok(matched);
+        }
+        let trends = pairing.trends(plan.strategy);
+        let best = refine::standing(lattice, &values, &trends);
+        let evaluations = matched.entry.evaluations + objective.compared();
+        let outcome = Outcome { best: best.clone(), fitness, evaluations, generations: 0 };
+        let mut entry = entry(plan, stage, lattice, matched.entry.source, &outcome, values)?;
+        let is_between = |name: &String| {
+            let axis = lattice.axes.iter().position(|axis| axis.name == *name);
+            axis.is_some_and(|k| lattice.axes[k].index_of(entry.target[k]).is_none())
+        };
+        let saturated = entry.saturated.iter().filter(|name| !is_between(name)).cloned().collect();
+        entry.saturated = saturated;
+        Ok(Matched { best, compared: evaluations, entry })
+    }
+
     /// The match of one source point.
     fn find(
         &self,
@@ -134,7 +181,8 @@ impl Eye<'_> {
             },
             Self::Own(Own { stage, .. }) => {
                 let outcome = search_one(plan, stage, values, problem, stop)?;
-                let entry = entry(plan, stage, problem.lattice, values.to_vec(), &outcome)?;
+                let target = problem.lattice.values(&outcome.best);
+                let entry = entry(plan, stage, problem.lattice, values.to_vec(), &outcome, target)?;
                 Ok(Matched { best: outcome.best, compared: outcome.evaluations, entry })
             }
         }
@@ -150,6 +198,8 @@ fn run(
 ) -> Result<Probe, RemapError> {
     let lattice = Lattice { axes: plan.target_axes.clone() };
     let sources = Lattice { axes: plan.source_axes.clone() };
+    let syntheses = eye.syntheses();
+    syntheses.clear();
     let total = sources.len();
     let mut found: Vec<Option<(Point, Entry)>> = vec![None; total];
     let mut journal = match state {
@@ -189,6 +239,14 @@ fn run(
             }),
         };
         let problems: Vec<Problem> = wave.iter().map(|(_, indices)| problem(indices)).collect();
+        let led: Vec<Led> = match plan.strategy {
+            Strategy::Unconstrained => vec![Led::new(); wave.len()],
+            Strategy::Constrained => {
+                let target =
+                    |p: &[u32]| found[place_of(&sources, p)].as_ref().map(|(_, entry)| &entry.target);
+                wave.iter().map(|(_, indices)| pairing.led_values(indices, &target)).collect()
+            }
+        };
         let searched = match &table {
             Some((table, stage)) => search_all(plan, (table, stage), &lattice, &values, problems, stop),
             None => {
@@ -197,7 +255,9 @@ fn run(
             }
         };
         let results: Vec<Matched> = searched.map_err(|e| interrupted(e, done, total))?;
-        for ((place, _), Matched { best, compared, entry }) in wave.into_iter().zip(results) {
+        for (((place, _), matched), led) in wave.into_iter().zip(results).zip(led) {
+            let matched = eye.refined(plan, &lattice, matched, (&pairing, &led), stop);
+            let Matched { best, compared, entry } = matched.map_err(|e| interrupted(e, done, total))?;
             if let Some(journal) = &mut journal {
                 journal.append(place, &best, &entry)?;
             }
@@ -209,7 +269,11 @@ fn run(
     if let Some(journal) = journal {
         journal.remove();
     }
-    Ok(Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len()))
+    let mut probe =
+        Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len());
+    probe.totals.rendered = Some(table.map_or_else(|| syntheses.rendered(), |(table, _)| table.len()));
+    probe.totals.synthesis = syntheses.record();
+    Ok(probe)
 }
 
 /// An error of a search, with what was done where it was stopped from outside.
@@ -254,7 +318,7 @@ fn search_all(
     let tasks = values.iter().zip(problems).map(task).collect::<Result<Vec<_>, RemapError>>()?;
     let results = table.search(&tasks, stop)?;
     let entry = |(values, Found { outcome, compared }): (&Vec<f64>, Found)| {
-        let entry = entry(plan, stage, lattice, values.clone(), &outcome)?;
+        let entry = entry(plan, stage, lattice, values.clone(), &outcome, lattice.values(&outcome.best))?;
         Ok(Matched { best: outcome.best, compared, entry })
     };
     values.par_iter().zip(results).map(entry).collect()
@@ -272,7 +336,8 @@ fn search_one(
     let appearance = &*stage.known_appearances(std::slice::from_ref(&source)).swap_remove(0);
     let (lattice, compared) = (problem.lattice, HashSet::new());
     let look = SourceLook::rounded(&source);
-    let mut objective = Match { plan, stage, lattice, source: look, appearance, compared, stop };
+    let family = family(plan, &look, Body::Matched)?;
+    let mut objective = Match { plan, stage, lattice, source: look, appearance, compared, family, stop };
     let found = searched(plan, problem, &mut objective)?;
     let target = plan.target_material(&source, &lattice.values(&found.best))?;
     let seen = stage.known_appearances(&[target]).swap_remove(0);
@@ -324,8 +389,8 @@ fn entry(
     lattice: &Lattice,
     source: Vec<f64>,
     outcome: &Outcome,
+    target: Vec<f64>,
 ) -> Result<Entry, RemapError> {
-    let target = lattice.values(&outcome.best);
     let material = plan.source_material(&source)?;
     let [nrmsd, nrmsd_masked] = stage.nrmsd(&material, &plan.target_material(&material, &target)?)?;
     Ok(Entry {
@@ -380,9 +445,16 @@ impl Pairing {
         let followers = |role: &Role| -> Vec<(usize, Trend)> {
             (0..to.len()).filter_map(|k| Some((k, role.trend(to[k])?))).collect()
         };
+        let chosen = |source: &str| plan.pairs.iter().find(|pair| pair.source == source);
         let split = |switch: bool| -> Vec<Vec<(usize, Trend)>> {
-            let of = |role| followers(role).into_iter().filter(|(k, _)| is_switch(*k) == switch).collect();
-            from.iter().map(of).collect()
+            let of = |(role, axis): (&Role, &lookmatch_search::Axis)| {
+                let followers = match chosen(&axis.name) {
+                    Some(pair) => pair.followers(&plan.target_axes, |k| role.trend(to[k])),
+                    None => followers(role),
+                };
+                followers.into_iter().filter(|(k, _)| is_switch(*k) == switch).collect()
+            };
+            from.iter().zip(&plan.source_axes).map(of).collect()
         };
         let places = |axes: Vec<(usize, Trend)>| axes.into_iter().map(|(k, _)| k).collect();
         Ok(Self {
@@ -390,6 +462,24 @@ impl Pairing {
             switches: split(true).into_iter().map(places).collect(),
             levels: plan.source_axes.iter().map(|a| a.levels.clone()).collect(),
         })
+    }
+
+    /// The target axes that follow others, and how; none where each source point is on its own.
+    fn trends(&self, strategy: Strategy) -> Vec<(usize, Trend)> {
+        let followers = self.targets.iter().flatten().copied();
+        if strategy == Strategy::Constrained { followers.collect() } else { Vec::new() }
+    }
+
+    /// The target values of the neighbours with one smaller source parameter, along the axes that follow it.
+    fn led_values<'f>(&self, indices: &[u32], target: &dyn Fn(&[u32]) -> Option<&'f Vec<f64>>) -> Led {
+        let mut led = Led::new();
+        for axis in (0..indices.len()).filter(|axis| indices[*axis] > 0) {
+            let mut smaller = indices.to_vec();
+            smaller[axis] -= 1;
+            let Some(values) = target(&smaller).filter(|values| !values.is_empty()) else { continue };
+            led.extend(self.targets[axis].iter().map(|(k, trend)| (*k, *trend, values[*k])));
+        }
+        led
     }
 
     /// A source point on its own.

@@ -108,6 +108,11 @@ impl<'a> FitnessTable<'a> {
         Ok(Some(Self { stage, lattice, looks, look_of, projections, coordinates, slack, diffuse }))
     }
 
+    /// Looks that were rendered.
+    pub(crate) fn len(&self) -> usize {
+        self.looks.len()
+    }
+
     /// The best target of each source within its bounds, at a tie the first in lexicographic order.
     pub(crate) fn search(
         &self,

@@ -372,6 +372,7 @@ class Model:
             "parameters": parameters,
             "surveyed": searched,
             "searched": searched,
+            "linear": [p["name"] for p in parameters if p["role"] == "specular-reflectance"],
             **more,
         }
         self.choices = [p["name"] for p in parameters if p["kind"] == "choice"]

@@ -276,6 +276,7 @@ def model(name, title, anisotropic, summary):
         "parameters": [COLOR, SPECULARITY, *widths],
         "surveyed": ["specularity", *along],
         "searched": ["specularity", *along],
+        "linear": ["specularity"],
     }
 
 

@@ -21,6 +21,7 @@
 //! ```
 
 mod axis;
+mod cma_es;
 mod error;
 mod exhaustive;
 mod genetic;
@@ -34,8 +35,10 @@ mod registry;
 mod sampling;
 mod settings;
 mod survey;
+mod synthesis;
 
 pub use axis::Axis;
+pub use cma_es::CmaEs;
 pub use error::{ObjectiveError, SearchError};
 pub use exhaustive::Exhaustive;
 pub use genetic::Genetic;
@@ -45,3 +48,4 @@ pub use problem::{Objective, ObjectiveFn, Outcome, Problem, Search};
 pub use registry::{Entry, by_name, registry};
 pub use settings::{Breeding, Duplicates, GeneticSettings, OutOfBounds, StallDivisor, Start, Tournament};
 pub use survey::{Survey, spread};
+pub use synthesis::{First, Synthesis};

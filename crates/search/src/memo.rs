@@ -34,6 +34,16 @@ impl<'a> Memo<'a> {
         Ok(points.iter().map(|point| self.known[point]).collect())
     }
 
+    /// [`Objective::forecast`].
+    pub fn forecast(&mut self, points: &[Point]) -> Option<Vec<f64>> {
+        self.objective.forecast(points)
+    }
+
+    /// [`Objective::is_linear`].
+    pub fn is_linear(&self, axis: usize) -> bool {
+        self.objective.is_linear(axis)
+    }
+
     /// Fitness of a point that has been evaluated.
     pub fn get(&self, point: &Point) -> Option<f64> {
         self.known.get(point).copied()

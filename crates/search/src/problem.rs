@@ -11,6 +11,19 @@ pub trait Objective {
     /// # Errors
     /// Whatever keeps a point from being evaluated; the search stops and hands it on.
     fn evaluate(&mut self, points: &[Point]) -> Result<Vec<f64>, ObjectiveError>;
+
+    /// What the fitness of points is likely to be, in their order, at no cost: for objectives that learn from what they
+    /// evaluated. `None` where nothing is known yet, and by default.
+    fn forecast(&mut self, points: &[Point]) -> Option<Vec<f64>> {
+        let _ = points;
+        None
+    }
+
+    /// True where forecasts along an axis follow from what is evaluated at its two ends; never by default.
+    fn is_linear(&self, axis: usize) -> bool {
+        let _ = axis;
+        false
+    }
 }
 
 /// An [`Objective`] from a plain function of one point that cannot fail.

@@ -1,6 +1,6 @@
 //! The search methods by name. Adding one takes a file of its own and a line here.
 
-use crate::{Exhaustive, Genetic, Search, SearchError, Survey};
+use crate::{CmaEs, Exhaustive, Genetic, Search, SearchError, Survey, Synthesis};
 
 /// One search method in the registry.
 #[derive(Clone, Copy, Debug)]
@@ -14,11 +14,14 @@ pub struct Entry {
 }
 
 #[rustfmt::skip] // one line per method
-static REGISTRY: [Entry; 5] = [
+static REGISTRY: [Entry; 8] = [
     Entry { name: "genetic", about: "integer genetic algorithm with a final lattice descent (default)", make: || Box::new(Genetic::default()) },
     Entry { name: "genetic-guarnera2018", about: "the genetic algorithm as Guarnera et al. 2018 describe it", make: || Box::new(Genetic::guarnera2018()) },
     Entry { name: "genetic-deep2009", about: "MI-LXPM as Deep et al. 2009 describe it", make: || Box::new(Genetic::deep2009()) },
     Entry { name: "survey", about: "few evaluations: evenly spread points, then a compass search (default for models of other renderers)", make: || Box::new(Survey::default()) },
+    Entry { name: "synthesis", about: "fewest renders: candidates come from synthesised pictures, and are verified by real ones", make: || Box::new(Synthesis::default()) },
+    Entry { name: "synthesis-half-rate", about: "synthesis from every second level of each axis, as Guarnera et al. 2018 describe it", make: || Box::new(Synthesis::half_rate()) },
+    Entry { name: "cma-es", about: "covariance matrix adaptation (Hansen 2016) with a final lattice descent", make: || Box::new(CmaEs::default()) },
     Entry { name: "exhaustive", about: "every point within bounds: the ground truth", make: || Box::new(Exhaustive::default()) },
 ];
 

@@ -8,7 +8,7 @@ use std::time::Instant;
 use lookmatch_materials::split_name;
 use lookmatch_remap::{
     Assignment, Counts, CrossStage, Endpoint, Event, Options, Plan, Preset, Probe, RemapError, Sampling,
-    Side, Stage, Strategy, journal_path, losses, remap, remap_across,
+    Side, Stage, Strategy, SynthesisRecord, Totals, journal_path, losses, remap, remap_across,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -60,6 +60,7 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         args.output.display(),
         probe.entries.len(),
     );
+    eprint!("{}", renders_text(&probe));
     costs.iter().for_each(|cost| eprintln!("{}", cost.text()));
     eprint!("{}{}", noise_text(&probe), fit_summary(&probe));
     let losses = losses(&probe)?;
@@ -75,13 +76,30 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
     if args.json.json {
         let summary = json!({
             "probe": args.output, "source_points": probe.entries.len(), "seconds": seconds,
-            "evaluations": probe.totals.evaluations, "lattice_points": probe.totals.lattice_points,
+            "evaluations": probe.totals.evaluations, "rendered": probe.totals.rendered,
+            "synthesis": probe.totals.synthesis, "lattice_points": probe.totals.lattice_points,
             "mean_fitness": mean, "saturated": saturated, "losses": losses, "validation": validation,
             "renderers": costs, "failed": probe.entries.len() - probe.found().count(),
         });
         return print_json(&summary);
     }
     Ok(())
+}
+
+/// How many targets were rendered for how many comparisons, and how far synthesised pictures could be trusted.
+fn renders_text(probe: &Probe) -> String {
+    let Totals { evaluations, lattice_points, rendered, synthesis } = &probe.totals;
+    let Some(rendered) = rendered else { return String::new() };
+    let each = *rendered as f64 / probe.entries.len() as f64;
+    let mut text = format!(
+        "{rendered} of {lattice_points} target materials rendered ({each:.1} for each source), {evaluations} comparisons\n"
+    );
+    if let Some(SynthesisRecord { components: [point, environment], held_out, mean, most, .. }) = synthesis {
+        text += &format!(
+            "synthesised from {point} + {environment} components; {held_out} candidates rendered after they were synthesised differ by {mean:.3} in fitness on average, 95 % by {most:.3} or less\n"
+        );
+    }
+    text
 }
 
 /// What pictures of a renderer have cost.
@@ -225,6 +243,8 @@ fn options(args: &RemapArgs, fix: Vec<Assignment>) -> Options {
         mask: args.mask,
         quick: args.quick,
         size: args.size,
+        pairs: args.pair.clone(),
+        refine: args.refine,
         sampling: Sampling {
             samples: args.samples,
             most: args.max_samples.unwrap_or(args.samples * if args.quick { 1 } else { 4 }).max(args.samples),

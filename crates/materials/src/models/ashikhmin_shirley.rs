@@ -36,6 +36,7 @@ pub static MODEL: Model = Model {
     named: &[CONDUCTOR],
     surveyed: &["roughness"],
     searched: &["roughness"],
+    linear: &["specular"],
     build: |v| Box::new(metal(Shape::Phong, v)),
     ..Model::BLANK
 };

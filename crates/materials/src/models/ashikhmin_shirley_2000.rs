@@ -82,6 +82,7 @@ pub static MODEL: Model = Model {
     named: &[CHOSEN_CONDUCTOR],
     surveyed: &["f0", "exponent"],
     searched: &["f0", "exponent"],
+    linear: &["diffuse", "specular", "f0"],
     presets: presets::ashikhmin_shirley,
     build: |v| {
         let coupling = coupling(v.choice("coupling")).unwrap_or(Coupling::Coupled);

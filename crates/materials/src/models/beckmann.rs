@@ -39,6 +39,7 @@ pub static MODEL: Model = Model {
     aliases: &[ROUGHNESS],
     surveyed: &["ior", "roughness"],
     searched: &["specular", "ior", "roughness"],
+    linear: &["diffuse", "specular"],
     build: |v| Box::new(plastic(Shape::Beckmann, v)),
     ..Model::BLANK
 };

@@ -32,6 +32,7 @@ pub static MODEL: Model = Model {
     named: &[CONDUCTOR],
     surveyed: &["roughness"],
     searched: &["roughness"],
+    linear: &["specular"],
     build: |v| Box::new(metal(Shape::Beckmann, v)),
     ..Model::BLANK
 };

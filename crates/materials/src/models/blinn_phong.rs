@@ -59,6 +59,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular", "exponent"],
     searched: &["specular", "exponent"],
+    linear: &["diffuse", "specular"],
     presets: presets::blinn_phong,
     build: |v| {
         let variant = variant(v.choice("variant")).unwrap_or(Variant::Exact);

@@ -73,6 +73,7 @@ pub static MODEL: Model = Model {
     named: &[CHOSEN_CONDUCTOR],
     surveyed: &["ior", "roughness"],
     searched: &["specular", "ior", "roughness"],
+    linear: &["diffuse", "specular"],
     presets: presets::cook_torrance,
     build: |v| {
         let over_modern = match v.choice("variant") {

@@ -78,6 +78,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular", "roughness"],
     searched: &["specular", "roughness"],
+    linear: &["metallic", "subsurface", "specular", "specular_tint", "sheen", "sheen_tint", "clearcoat"],
     build: |v| Box::new(Disney::new(&Inputs::of(v))),
     vectors: Some(("disney2012", vector)),
     ..Model::BLANK

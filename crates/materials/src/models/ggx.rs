@@ -44,6 +44,7 @@ pub static MODEL: Model = Model {
     aliases: &[ROUGHNESS],
     surveyed: &["ior", "roughness"],
     searched: &["specular", "ior", "roughness"],
+    linear: &["diffuse", "specular"],
     build: |v| Box::new(plastic(Shape::Ggx, v)),
     ..Model::BLANK
 };

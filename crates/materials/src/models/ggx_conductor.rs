@@ -35,6 +35,7 @@ pub static MODEL: Model = Model {
     named: &[CONDUCTOR],
     surveyed: &["roughness"],
     searched: &["roughness"],
+    linear: &["specular"],
     build: |v| Box::new(metal(Shape::Ggx, v)),
     ..Model::BLANK
 };

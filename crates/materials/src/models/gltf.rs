@@ -96,6 +96,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["ior", "roughness"],
     searched: &["ior", "roughness"],
+    linear: &["base_color", "metallic", "specular", "clearcoat"],
     check: |v| match v.number("ior") {
         ior if ior > 0.0 && ior < 1.0 => Err(format!("ior={ior}: 1 or more, or 0 for full reflectance")),
         _ => Ok(()),

@@ -57,6 +57,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular", "glossiness"],
     searched: &["specular", "glossiness"],
+    linear: &["diffuse"],
     build: |v| {
         Box::new(SpecularGlossiness {
             body: body(v),

@@ -80,6 +80,7 @@ pub static MODEL: Model = Model {
     named: &[CHOSEN_CONDUCTOR],
     surveyed: &["f0", "roughness"],
     searched: &["f0", "roughness"],
+    linear: &["diffuse", "specular"],
     build: |v: &Values| {
         let f0 = v.colour("f0");
         let fresnel = match v.choice("fresnel") {

@@ -104,6 +104,7 @@ pub static MODEL: Model = Model {
     aliases: &[Alias { name: "cxy", parameters: &["cx", "cy"] }],
     surveyed: &["specular", "exponent"],
     searched: &["specular", "exponent"],
+    linear: &["diffuse", "specular", "weight"],
     presets: presets::lafortune,
     check,
     build: |v| {

@@ -20,6 +20,7 @@ pub static MODEL: Model = Model {
     parameters: &[DIFFUSE],
     surveyed: &["diffuse"],
     searched: &["diffuse"],
+    linear: &["diffuse"],
     build: |v| Box::new(Lambert { diffuse: v.colour("diffuse") }),
     vectors: Some(("lambert", vector)),
     ..Model::BLANK

@@ -55,6 +55,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["ior", "b"],
     searched: &["a", "b"],
+    linear: &["diffuse", "a"],
     presets: presets::low_abc,
     build: |v| {
         Box::new(LowAbc {

@@ -34,6 +34,7 @@ pub static MODEL: Model = Model {
     parameters: &[DIFFUSE, A, B, C, IOR],
     surveyed: &["ior", "b"],
     searched: &["a", "b"],
+    linear: &["diffuse", "a"],
     presets: presets::low_smooth,
     build: |v| {
         Box::new(LowSmooth {

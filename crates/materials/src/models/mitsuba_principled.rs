@@ -70,6 +70,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["eta", "roughness"],
     searched: &["eta", "roughness"],
+    linear: &["metallic", "spec_tint", "sheen", "sheen_tint", "flatness", "clearcoat"],
     build: |v| Box::new(Principled::new(&Inputs::of(v))),
     vectors: Some(("principled_mitsuba3", vector)),
     ..Model::BLANK

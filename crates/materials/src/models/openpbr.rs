@@ -142,6 +142,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular_ior", "specular_roughness"],
     searched: &["specular_ior", "specular_roughness"],
+    linear: &["coat_darkening", "fuzz_weight", "fuzz_color"],
     build: |v: &Values| {
         let compensated = v.choice("energy_compensation") == "turquin";
         let mut pbr = Openpbr::new(&|name| v.number(name), &|name| v.colour(name), compensated);

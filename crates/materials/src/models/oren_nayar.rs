@@ -91,6 +91,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["diffuse", "sigma"],
     searched: &["diffuse", "sigma"],
+    linear: &["diffuse"],
     build: |v| {
         let variant = variant(v.choice("variant")).unwrap_or(Variant::Qualitative);
         let roughness = v.number(if variant.reads_sigma() { "sigma" } else { "roughness" });

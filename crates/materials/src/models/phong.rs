@@ -40,6 +40,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular", "exponent"],
     searched: &["specular", "exponent"],
+    linear: &["diffuse", "specular"],
     build: |v| {
         Box::new(Phong {
             diffuse: v.colour("diffuse"),

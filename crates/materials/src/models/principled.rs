@@ -127,6 +127,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["ior", "roughness"],
     searched: &["ior", "roughness"],
+    linear: &["metallic", "sheen_weight"],
     build: |v: &Values| Box::new(Principled::new(v)),
     ..Model::BLANK
 };

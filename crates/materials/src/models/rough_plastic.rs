@@ -84,6 +84,7 @@ pub static MODEL: Model = Model {
     aliases: &[Alias { name: "int_ior", parameters: &["ior"] }],
     surveyed: &["ior", "alpha"],
     searched: &["specular_reflectance", "ior", "alpha"],
+    linear: &["diffuse_reflectance", "specular_reflectance"],
     build: |v| {
         let plastic = RoughPlastic::new(
             interface(

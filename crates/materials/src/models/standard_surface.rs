@@ -129,6 +129,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["specular_IOR", "specular_roughness"],
     searched: &["specular_IOR", "specular_roughness"],
+    linear: &["metalness", "sheen", "sheen_color", "coat_color"],
     build: |v: &Values| {
         let mut surface = StandardSurface::new(&|name| v.number(name), &|name| v.colour(name));
         let sheen = v.number("sheen");

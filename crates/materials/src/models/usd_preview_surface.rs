@@ -101,6 +101,7 @@ pub static MODEL: Model = Model {
     ],
     surveyed: &["ior", "roughness"],
     searched: &["ior", "roughness"],
+    linear: &["clearcoat"],
     build: |v| Box::new(PreviewSurface::of(v)),
     ..Model::BLANK
 };

@@ -56,6 +56,7 @@ pub static MODEL: Model = Model {
     aliases: &[ROUGHNESS],
     surveyed: &["specular", "roughness"],
     searched: &["specular", "roughness"],
+    linear: &["diffuse", "specular"],
     presets: presets::ward,
     build: |v| {
         Box::new(Ward {

@@ -59,6 +59,8 @@ impl Stage {
             preset: probe.preset,
             seed: probe.seed,
             metric,
+            pairs: Vec::new(),
+            refine: false,
             mask: probe.metric.mask,
             scene: probe.scene.clone(),
             size: probe.size,

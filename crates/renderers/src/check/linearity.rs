@@ -1,16 +1,21 @@
 //! Twice the light is twice the picture, and nothing is clipped.
 
 use lookmatch_imaging::Image;
+use lookmatch_materials::Kind;
 use lookmatch_rendering::Scene;
+use serde_json::json;
 
 use super::compare;
 use super::finding::Limit;
-use super::session::{Session, Worn, ball, marked_map};
+use super::session::{Session, Worn, ball, defaults, marked_map, own_name};
 use super::{Check, Finding};
 use crate::{Light, RendererError};
 
-pub(super) const CHECK: Check =
-    Check { name: "linearity", about: "twice the light, a thousand times the light, twice the albedo", run };
+pub(super) const CHECK: Check = Check {
+    name: "linearity",
+    about: "twice the light, a thousand times the light, twice the albedo; what models declare",
+    run,
+};
 
 fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError> {
     let has = |light| session.hello.capabilities.lights.contains(&light);
@@ -29,6 +34,35 @@ fn run(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError
         let once = sky(session, "sky", 1.0, &grey)?;
         ratio("map", 2.0, &sky(session, "twice", 2.0, &grey)?, &once, finding);
         ratio("map", 1e3, &sky(session, "bright", 1e3, &grey)?, &once, finding);
+    }
+    declared(session, finding)
+}
+
+/// Halfway between two values of a parameter that a model says it is linear in, the picture is halfway between theirs.
+fn declared(session: &mut Session, finding: &mut Finding) -> Result<(), RendererError> {
+    let light = session.hello.capabilities.lights.contains(&Light::Environment);
+    for model in session.models.clone() {
+        for parameter in model.parameters.iter().filter(|p| model.linear.contains(&p.name)) {
+            let Some(range) = parameter.range() else { continue };
+            let (low, high) = (range.search.min, range.search.max);
+            let shown = |value: f64| {
+                let mut worn = defaults(model);
+                let is_colour = matches!(parameter.kind, Kind::Colour { .. });
+                let value = if is_colour { json!([value, value, value]) } else { json!(value) };
+                worn.values.insert(parameter.name.into(), value);
+                if light { sky(session, "sky", 1.0, &worn) } else { lamp(session, "once", 1.0, &worn) }
+            };
+            let (low, high, middle) = (shown(low)?, shown(high)?, shown((low + high) / 2.0)?);
+            let halfway = low.zipped(&high, |a, b| (a + b) / 2.0);
+            let name = format!("{} halfway in {}: ratio", own_name(model), parameter.name);
+            if !finding.measure(name, quotient(&middle, &halfway), Limit::between(0.97, 1.03)) {
+                finding.remark(format!(
+                    "{} says that it is linear in {}, and is not",
+                    own_name(model),
+                    parameter.name
+                ));
+            }
+        }
     }
     Ok(())
 }
