@@ -369,7 +369,9 @@ fn proportional(
     inputs.iter().filter(|i| is_input(i)).for_each(|i| middle[*i] = reference);
     let places: Vec<usize> = inputs.iter().copied().filter(|i| !is_input(i)).collect();
     let is_textured = places.len() < inputs.len();
-    factors.dedup();
+    if factors.iter().all(|factor| *factor == factors[0]) {
+        factors.truncate(1);
+    }
     let dark = Question { base: &base, inputs: question.inputs.clone(), ..*question };
     let mut known = Known::new(&dark, index, &places, &middle).over(reference);
     let tables = factors.iter().map(|factor| CarriedTable::new(&mut known, 0, *factor));

@@ -173,7 +173,12 @@ impl Proportion {
             .map(|i| question.inputs[*i].range)
             .map(|[a, b]| vec![a, 0.5 * (a + b), b])
             .collect();
-        let points: Vec<Vec<f64>> = if others.is_empty() { Vec::new() } else { points(&ends) };
+        if others.is_empty() {
+            return Ok(None);
+        }
+        // The middle of the probe has a result, whatever failed elsewhere.
+        let mut points = points(&ends);
+        points.push(others.iter().map(|i| middle[*i]).collect());
         let body = |point: &[f64], colour: [f64; 3]| -> Result<Option<Vec<f64>>, TextureError> {
             let mut values = middle.to_vec();
             others.iter().zip(point).for_each(|(input, value)| values[*input] = *value);
@@ -193,7 +198,7 @@ impl Proportion {
         for reference in REFERENCES {
             let is_proportional =
                 points.par_iter().map(|p| is_one(p, reference)).collect::<Result<Vec<_>, _>>()?;
-            if !is_proportional.is_empty() && is_proportional.into_iter().all(|is_one| is_one) {
+            if is_proportional.into_iter().all(|is_one| is_one) {
                 let mut base = question.base.clone();
                 base.set_value(place, Value::Colour([reference; 3])).map_err(RemapError::from)?;
                 return Ok(Some(Self { base, reference, factors }));

@@ -243,7 +243,8 @@ fn bodies_under_an_interface_are_carried_over_up_to_the_limit_of_their_colour() 
     // The colour in a texture, and two that are the same for all texels: the source is too bright for the target here and there.
     for (textures, base, bright) in [
         (&textures[..], "ward", 200..1500),
-        (&textures[..2], "ward:diffuse=0.65/0.2/0.05", 1..200),
+        (&textures[..2], "ward:diffuse=0.65/0.65/0.05", 1..400),
+        (&textures[..2], "ward:diffuse=0.1/0.65/0.65", 1..400),
         (&textures[..2], "ward:diffuse=0.9/0.8/0.1", 600..1500),
     ] {
         let (report, colours) = bodies(&probe, textures, base);
