@@ -12,7 +12,11 @@ const PROBE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../textures/src/ward-g
 
 fn write_png(path: &Path, size: u32, channels: usize, code: impl Fn(usize) -> u8) {
     let mut encoder = png::Encoder::new(File::create(path).unwrap(), size, size);
-    encoder.set_color(if channels == 1 { png::ColorType::Grayscale } else { png::ColorType::Rgb });
+    encoder.set_color(match channels {
+        1 => png::ColorType::Grayscale,
+        3 => png::ColorType::Rgb,
+        _ => png::ColorType::Rgba,
+    });
     encoder.add_text_chunk("Author".into(), "A. Turner".into()).unwrap();
     let codes: Vec<u8> = (0..size as usize * size as usize * channels).map(code).collect();
     encoder.write_header().unwrap().write_image_data(&codes).unwrap();
@@ -78,6 +82,32 @@ fn maps_are_named_by_target_parameters_and_the_rest_are_numbers() {
 }
 
 #[test]
+fn channels_of_packed_textures_are_chosen_by_letter() {
+    let folder = tempfile::tempdir().unwrap();
+    write_png(&folder.path().join("packed.png"), 8, 4, |i| [0, 102, 51, 153][i % 4]);
+    let map = |textures: &[&str]| {
+        let mut arguments = vec!["apply", PROBE, "-o", "out", "--json"];
+        textures.iter().for_each(|texture| arguments.extend(["--texture", texture]));
+        json(folder.path(), &arguments);
+        read_png(&folder.path().join("out/roughness.png")).0[0]
+    };
+    let expected = |roughness: &str| {
+        let one = json(
+            folder.path(),
+            &["apply", PROBE, "specular=0.2", &format!("roughness={roughness}"), "--json"],
+        );
+        (255.0 * one["target"]["roughness_u"].as_f64().unwrap()).round() as u8
+    };
+    let [green, alpha] =
+        ["g", "A"].map(|channel| map(&[&format!("roughness=packed.png:{channel}"), "specular=packed.png:b"]));
+    assert_eq!([green, alpha], ["0.4", "0.6"].map(expected));
+    assert_ne!(green, alpha);
+    let arguments =
+        ["apply", PROBE, "-o", "out", "--fix", "specular=0.2", "--texture", "roughness=packed.png"];
+    refused(folder.path(), &arguments, 2, &["packed.png", "3 channels", "packed.png:r", ":a"]);
+}
+
+#[test]
 fn faults_are_told_once_and_leave_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -115,6 +145,18 @@ fn faults_are_told_once_and_leave_nothing() {
         2,
         &["gamma", "linear"],
     );
+    // A texture as long as it should be, and one that ends too early.
+    let made =
+        [&["apply", PROBE, "-o", "made", "--format", "exr-half"][..], &with("roughness=r.png"), &["--clamp"]];
+    let output = lookmatch(folder.path(), &made.concat());
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{told}");
+    for words in ["1 of 1024 values", "x = 6, y = 2", "moved to the nearest end"] {
+        assert!(told.contains(words), "no '{words}' in {told}");
+    }
+    let whole = fs::read(at("made/roughness.exr")).unwrap();
+    fs::write(at("cut.exr"), &whole[..whole.len() - 100]).unwrap();
+    run(&with("roughness=cut.exr"), 1, &["cut.exr", "truncated"]);
     // What textures do not go through is refused, not left out.
     for unsupported in [&["--smooth"][..], &["--then", PROBE]] {
         let arguments = [&with("roughness=r.png")[..], unsupported].concat();

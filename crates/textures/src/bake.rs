@@ -1,22 +1,19 @@
 //! A probe as tables: what `apply` says of every texel, asked once for each point of a grid.
 //!
 //! Parameters that were searched are linear between the probe's own levels, so their table has these levels and is exact. What is
-//! carried over from the source (the colour of a body, say) may bend between them: its grid is made finer where it does, until
-//! the largest error found between its points is below [`TOLERANCE`] of the parameter's range, or the points are too many.
+//! carried over from the source (the colour of a body, say) may bend between them: its tables are refined where it does
+//! ([`CarriedTable`]).
 
-use std::collections::HashMap;
+use std::sync::atomic::AtomicBool;
 
 use lookmatch_materials::{Kind, Material, Value};
 use lookmatch_remap::{Axis, Probe, RemapError, apply};
 use rayon::prelude::*;
 
 use crate::TextureError;
+use crate::carried::{CarriedTable, Factor, Known, Proportion};
+use crate::convert::{Progress, is_stopped};
 use crate::lut::{Between, Lut, MAX_INPUTS};
-
-/// Largest error of a table of carried-over values, as a share of the range that they have.
-pub const TOLERANCE: f64 = 1e-4;
-/// Points that are asked for such a table, after which the error stays as it is, and is told.
-const MAX_POINTS: usize = 8_000;
 
 /// A source parameter that comes from a texture.
 #[derive(Clone, Debug)]
@@ -26,7 +23,7 @@ pub(crate) struct Input {
     pub(crate) is_colour: bool,
     /// What the probe accepts.
     pub(crate) range: [f64; 2],
-    levels: Vec<f64>,
+    pub(crate) levels: Vec<f64>,
     /// False for what is carried over.
     is_axis: bool,
 }
@@ -41,16 +38,18 @@ pub(crate) struct Map {
     pub(crate) channels: usize,
     /// Smallest and largest value.
     pub(crate) range: [f64; 2],
-    /// For values that are carried over: their table.
+    /// For values that are carried over: their tables.
     carried: Option<Carried>,
 }
 
 #[derive(Clone, Debug)]
 struct Carried {
-    /// The inputs of its table.
+    /// All that it depends on.
     inputs: Vec<usize>,
-    lut: Lut,
-    error: f64,
+    /// The inputs of its tables.
+    places: Vec<usize>,
+    /// One for all channels, or one for each.
+    tables: Vec<CarriedTable>,
 }
 
 /// A probe for some textures.
@@ -65,7 +64,7 @@ pub(crate) struct Baked {
 }
 
 /// The numbers of a value; none for a choice or a file.
-fn numbers(value: &Value) -> Vec<f64> {
+pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     match value {
         Value::Number(v) => vec![*v],
         Value::Colour(c) => c.to_vec(),
@@ -75,15 +74,17 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 /// What is asked: the probe with the parameters that textures leave alone.
-struct Question<'a> {
+pub(crate) struct Question<'a> {
     probe: &'a Probe,
-    base: &'a Material,
-    inputs: Vec<Input>,
+    pub(crate) base: &'a Material,
+    pub(crate) inputs: Vec<Input>,
+    progress: &'a (dyn Fn(Progress) + Sync),
+    stop: &'a AtomicBool,
 }
 
 impl Question<'_> {
     /// The source material for a value of each input; colours are grey.
-    fn source(&self, values: &[f64]) -> Result<Material, TextureError> {
+    pub(crate) fn source(&self, values: &[f64]) -> Result<Material, TextureError> {
         let mut source = self.base.clone();
         for (input, value) in self.inputs.iter().zip(values) {
             source.set_number(&input.name, *value).map_err(RemapError::from)?;
@@ -92,12 +93,26 @@ impl Question<'_> {
     }
 
     /// The target's values; none where the probe has no result.
-    fn target(&self, source: &Material) -> Result<Option<Vec<Value>>, TextureError> {
+    pub(crate) fn target(&self, source: &Material) -> Result<Option<Vec<Value>>, TextureError> {
+        if is_stopped(self.stop) {
+            return Err(TextureError::interrupted());
+        }
         match apply(self.probe, source, false) {
             Ok(applied) => Ok(Some(applied.target.values().to_vec())),
             Err(RemapError::Option(_)) if self.probe.entries.iter().any(|e| e.failed.is_some()) => Ok(None),
             Err(error) => Err(error.into()),
         }
+    }
+
+    /// Tells how many points of the table of a target parameter are known.
+    pub(crate) fn tell(&self, index: usize, points: usize) {
+        (self.progress)(Progress::Table { parameter: self.probe.to.model().parameters[index].name, points });
+    }
+
+    /// What a target parameter may be.
+    pub(crate) fn limits(&self, index: usize) -> [f64; 2] {
+        let range = self.probe.to.model().parameters[index].range();
+        range.map_or([f64::NEG_INFINITY, f64::INFINITY], |range| [range.valid.min, range.valid.max])
     }
 
     /// The target's values on a grid of some inputs, the others being as in `middle`.
@@ -122,9 +137,15 @@ impl Baked {
     /// # Errors
     /// A name that is no parameter, or not one that the probe can take from a texture; what `apply` refuses; a target whose
     /// channels depend on each other.
-    pub(crate) fn new(probe: &Probe, base: &Material, names: &[String]) -> Result<Self, TextureError> {
+    pub(crate) fn new(
+        probe: &Probe,
+        base: &Material,
+        names: &[String],
+        progress: &(dyn Fn(Progress) + Sync),
+        stop: &AtomicBool,
+    ) -> Result<Self, TextureError> {
         let inputs = names.iter().map(|name| input(probe, base, name)).collect::<Result<Vec<_>, _>>()?;
-        let question = Question { probe, base, inputs };
+        let question = Question { probe, base, inputs, progress, stop };
         let middle: Vec<f64> = question.inputs.iter().map(|i| i.levels[i.levels.len() / 2]).collect();
         let Some(values) = question.target(&question.source(&middle)?)? else {
             let reason = "the probe has no result in the middle of its range; remap again";
@@ -205,7 +226,8 @@ impl Baked {
 
     /// Carried-over parameters, and the largest error of the table of each.
     pub(crate) fn errors(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.maps.iter().filter_map(|m| Some((m.name.as_str(), m.carried.as_ref()?.error)))
+        let worst = |c: &Carried| c.tables.iter().map(|table| table.error).fold(0.0, f64::max);
+        self.maps.iter().filter_map(move |m| Some((m.name.as_str(), worst(m.carried.as_ref()?))))
     }
 
     /// Source parameters that a map depends on.
@@ -231,8 +253,10 @@ impl Baked {
             for (channel, plane) in planes.iter_mut().enumerate() {
                 let of =
                     |i: &usize| if self.inputs[*i].is_colour { inputs[*i][channel] } else { inputs[*i][0] };
-                let places: Vec<&[f32]> = carried.inputs.iter().map(of).collect();
-                carried.lut.evaluate(&places, &mut [&mut **plane]);
+                let places: Vec<&[f32]> = carried.places.iter().map(of).collect();
+                let table = &carried.tables[channel % carried.tables.len()];
+                let factors = if let Factor::Input(i) = &table.factor { of(i) } else { &[] };
+                table.evaluate(&places, factors, plane);
             }
         }
     }
@@ -242,7 +266,7 @@ fn differ(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).any(|(a, b)| (a - b).abs() > 1e-9)
 }
 
-fn range(values: &[f64]) -> [f64; 2] {
+pub(crate) fn range(values: &[f64]) -> [f64; 2] {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)]
 }
@@ -278,7 +302,8 @@ fn input(probe: &Probe, base: &Material, name: &str) -> Result<Input, TextureErr
         }
     };
     let ends = [valid.nearest(valid.min), valid.nearest(valid.max)];
-    let levels = (0..5).map(|k| ends[0] + (ends[1] - ends[0]) * f64::from(k) / 4.0).collect();
+    // What is carried over is nearly proportional to them. The first step is short: it must not end beyond a limit.
+    let levels = [0.0, 0.25, 1.0].map(|share| ends[0] + (ends[1] - ends[0]) * share).to_vec();
     Ok(Input { name: parameter.name.into(), is_colour, range: ends, levels, is_axis: false })
 }
 
@@ -309,14 +334,56 @@ fn carried(question: &Question, index: usize, middle: &[f64]) -> Result<Option<M
             parameter.name
         )));
     }
-    let (lut, range, error) = table(question, index, &inputs, middle)?;
-    Ok(Some(Map {
-        name: parameter.name.into(),
-        parameters: vec![parameter.name],
-        channels: if by_colour { channels } else { 1 },
-        range,
-        carried: Some(Carried { inputs, lut, error }),
-    }))
+    if channels == 3
+        && let Some(proportion) = Proportion::of(question, index, &inputs, middle)?
+    {
+        return proportional(question, index, inputs, middle, proportion).map(Some);
+    }
+    let mut known = Known::new(question, index, &inputs, middle);
+    let mut tables = vec![CarriedTable::new(&mut known, 0, Factor::One)?];
+    // Textures of numbers may change each channel in its own way.
+    if !by_colour && channels == 3 && known.has_hues() {
+        for channel in [1, 2] {
+            tables.push(CarriedTable::new(&mut known, channel, Factor::One)?);
+        }
+    }
+    let channels = if by_colour { channels } else { tables.len() };
+    Ok(Some(carried_map(
+        question,
+        index,
+        channels,
+        Carried { inputs: inputs.clone(), places: inputs, tables },
+    )))
+}
+
+/// The map of a colour that is in proportion to one of the source's.
+fn proportional(
+    question: &Question,
+    index: usize,
+    inputs: Vec<usize>,
+    middle: &[f64],
+    Proportion { base, reference, mut factors }: Proportion,
+) -> Result<Map, TextureError> {
+    let mut middle = middle.to_vec();
+    let is_input = |i: &usize| factors.contains(&Factor::Input(*i));
+    inputs.iter().filter(|i| is_input(i)).for_each(|i| middle[*i] = reference);
+    let places: Vec<usize> = inputs.iter().copied().filter(|i| !is_input(i)).collect();
+    let is_textured = places.len() < inputs.len();
+    if factors.iter().all(|factor| *factor == factors[0]) {
+        factors.truncate(1);
+    }
+    let dark = Question { base: &base, inputs: question.inputs.clone(), ..*question };
+    let mut known = Known::new(&dark, index, &places, &middle).over(reference);
+    let tables = factors.iter().map(|factor| CarriedTable::new(&mut known, 0, *factor));
+    let tables: Vec<CarriedTable> = tables.collect::<Result<_, _>>()?;
+    let channels = if is_textured || tables.len() > 1 { 3 } else { 1 };
+    Ok(carried_map(question, index, channels, Carried { inputs, places, tables }))
+}
+
+fn carried_map(question: &Question, index: usize, channels: usize, carried: Carried) -> Map {
+    let name = question.probe.to.model().parameters[index].name;
+    let ranges: Vec<f64> = carried.tables.iter().flat_map(|table| table.range).collect();
+    Map { name: name.into(), parameters: vec![name], channels, range: range(&ranges), carried: Some(carried) }
 }
 
 /// Whether a target parameter changes with an input, wherever the others are.
@@ -359,103 +426,18 @@ fn keeps_channels(question: &Question, index: usize, middle: &[f64]) -> Result<b
         let (Some(mixed), Some(grey)) = (mixed.get(channel), numbers(&grey[index]).first().copied()) else {
             return Ok(false);
         };
-        if (mixed - grey).abs() > TOLERANCE * grey.abs().max(1e-2) {
+        if (mixed - grey).abs() > crate::TOLERANCE * grey.abs().max(1e-2) {
             return Ok(false);
         }
     }
     Ok(true)
 }
 
-/// A table that is fine enough, the range of its values, and its largest error as a share of it.
-fn table(
-    question: &Question,
-    index: usize,
-    inputs: &[usize],
-    middle: &[f64],
-) -> Result<(Lut, [f64; 2], f64), TextureError> {
-    let mut known = Known { question, index, inputs, middle, values: HashMap::new() };
-    let mut levels: Vec<Vec<f64>> = inputs.iter().map(|i| question.inputs[*i].levels.clone()).collect();
-    loop {
-        let values = known.grid(&levels)?;
-        let span = range(&values);
-        let lut = Lut::new(&levels, &[(Between::Linear, values)]);
-        let lut = lut.map_err(|e| TextureError::Request(e.to_string()))?;
-        // By axis and interval: the error half-way, at the points of the other axes.
-        let mut errors: Vec<Vec<f64>> = Vec::new();
-        for axis in 0..inputs.len() {
-            let mut between = levels.clone();
-            between[axis] = levels[axis].windows(2).map(|p| 0.5 * (p[0] + p[1])).collect();
-            let exact = known.grid(&between)?;
-            let errors_here = interval_errors(&lut, &between, axis, &exact).into_iter();
-            errors.push(errors_here.map(|e| e / (span[1] - span[0]).max(1e-6)).collect());
-        }
-        let worst = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
-        // The errors of several axes add up.
-        let total: f64 = errors.iter().map(|e| worst(e)).sum();
-        if total <= TOLERANCE || known.values.len() > MAX_POINTS {
-            return Ok((lut, span, total));
-        }
-        let limit = (0.25 * worst(&errors.concat())).max(TOLERANCE / inputs.len() as f64);
-        for (levels, errors) in levels.iter_mut().zip(&errors) {
-            let coarse = levels.windows(2).zip(errors).filter(|(_, error)| **error > limit);
-            let middles: Vec<f64> = coarse.map(|(p, _)| 0.5 * (p[0] + p[1])).collect();
-            levels.extend(middles);
-            levels.sort_by(f64::total_cmp);
-        }
-    }
-}
-
-/// What was asked already about one parameter: each answer is two integrals over the hemisphere.
-struct Known<'a> {
-    question: &'a Question<'a>,
-    index: usize,
-    inputs: &'a [usize],
-    middle: &'a [f64],
-    values: HashMap<Vec<u64>, f64>,
-}
-
-impl Known<'_> {
-    /// The parameter on a grid; NaN where the probe has no result.
-    fn grid(&mut self, levels: &[Vec<f64>]) -> Result<Vec<f64>, TextureError> {
-        let points: Vec<Vec<f64>> = points(levels);
-        let key = |point: &Vec<f64>| -> Vec<u64> { point.iter().map(|v| v.to_bits()).collect() };
-        let missing: Vec<&Vec<f64>> = points.iter().filter(|p| !self.values.contains_key(&key(p))).collect();
-        let ask = |point: &&Vec<f64>| {
-            let mut values = self.middle.to_vec();
-            self.inputs.iter().zip(*point).for_each(|(input, value)| values[*input] = *value);
-            let target = self.question.target(&self.question.source(&values)?)?;
-            let value = target.and_then(|t| numbers(&t[self.index]).first().copied());
-            Ok((key(point), value.unwrap_or(f64::NAN)))
-        };
-        let found: Vec<(Vec<u64>, f64)> = missing.par_iter().map(ask).collect::<Result<_, TextureError>>()?;
-        self.values.extend(found);
-        Ok(points.iter().map(|p| self.values[&key(p)]).collect())
-    }
-}
-
 /// The points of a grid, the first axis slowest.
-fn points(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
+pub(crate) fn points(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
     levels.iter().fold(vec![Vec::new()], |points, levels| {
         let longer =
             |point: Vec<f64>| levels.iter().map(move |l| [&point[..], &[*l]].concat()).collect::<Vec<_>>();
         points.into_iter().flat_map(longer).collect()
     })
-}
-
-/// By level of an axis, the largest difference of a table from what is exact on a grid.
-fn interval_errors(lut: &Lut, levels: &[Vec<f64>], axis: usize, exact: &[f64]) -> Vec<f64> {
-    let points = points(levels);
-    let planes: Vec<Vec<f32>> =
-        (0..levels.len()).map(|k| points.iter().map(|p| p[k] as f32).collect()).collect();
-    let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
-    let mut found = vec![0.0; exact.len()];
-    lut.evaluate(&planes, &mut [&mut found]);
-    let mut errors = vec![0.0; levels[axis].len()];
-    let stride: usize = levels[axis + 1..].iter().map(Vec::len).product();
-    for (point, (found, exact)) in found.iter().zip(exact).enumerate() {
-        let interval = point / stride % levels[axis].len();
-        // NaN, where the probe has no result, is no error of the table.
-        errors[interval] = (f64::from(*found) - exact).abs().max(errors[interval]);
-    }
-    errors
 }

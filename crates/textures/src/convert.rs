@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use lookmatch_materials::Material;
 use lookmatch_remap::{Probe, RemapError};
 
+use crate::TOLERANCE;
 use crate::TextureError;
-use crate::bake::{Baked, Input, Map, TOLERANCE};
+use crate::bake::{Baked, Input, Map};
 use crate::encoding::{Codes, Encoding, named_srgb};
-use crate::files::{self, Container, Depth, Format, Header, Metadata, Sheet};
+use crate::files::{self, Channel, Container, Depth, Format, Header, Metadata, Sheet};
 use crate::report::{self, Report};
 use crate::stream::{Job, Outside, Reading, stream};
 use crate::udim::{Tiles, map_name, tiles};
@@ -23,6 +24,8 @@ pub struct Request<'a> {
     pub base: Material,
     /// Source parameters and their textures; `<UDIM>` or 1001 in a name stands for all tiles.
     pub textures: Vec<(String, PathBuf)>,
+    /// Source parameters whose textures are one channel of a packed one.
+    pub channels: Vec<(String, Channel)>,
     /// Source parameters whose textures are encoded otherwise than is taken for granted.
     pub encodings: Vec<(String, Encoding)>,
     /// Format of the maps; that of the most precise texture if `None`, and floats where it cannot hold the values.
@@ -35,18 +38,39 @@ pub struct Request<'a> {
     pub band_rows: Option<usize>,
 }
 
+/// What a conversion is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// A table of a target parameter that is carried over, which needs as many points as it takes.
+    Table {
+        /// The parameter.
+        parameter: &'static str,
+        /// Points that are known.
+        points: usize,
+    },
+    /// Rows of all tiles.
+    Rows {
+        /// Rows that are mapped.
+        done: usize,
+        /// Rows in all.
+        total: usize,
+    },
+}
+
 /// A texture with what was found out about it.
 pub(crate) struct Texture {
     pub(crate) tiles: Tiles,
     pub(crate) encoding: Encoding,
     pub(crate) header: Header,
+    /// The one of its channels that is used, if it is packed.
+    pub(crate) channel: Option<Channel>,
     pub(crate) codes: Codes,
     pub(crate) outside: Outside,
 }
 
 /// Maps textures through a probe. The folder has all maps afterwards, or none of them.
 ///
-/// `progress` is told rows done and rows in all. Two source parameters make one map of each target parameter that varies with
+/// Two source parameters make one map of each target parameter that varies with
 /// them; the others are in the report alone, which is `material.json` as well.
 ///
 /// # Errors
@@ -54,12 +78,23 @@ pub(crate) struct Texture {
 /// texels outside the probe's range, unless `clamp`; an end by `stop`.
 pub fn convert(
     request: &Request,
-    progress: &(dyn Fn(usize, usize) + Sync),
+    progress: &(dyn Fn(Progress) + Sync),
+    stop: &AtomicBool,
+) -> Result<Report, TextureError> {
+    converted(request, progress, stop).map_err(|error| match error {
+        TextureError::Interrupted { .. } => TextureError::Interrupted { folder: request.folder.clone() },
+        other => other,
+    })
+}
+
+fn converted(
+    request: &Request,
+    progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
 ) -> Result<Report, TextureError> {
     let base = base(request)?;
     let names: Vec<String> = request.textures.iter().map(|(name, _)| name.clone()).collect();
-    let baked = Baked::new(request.probe, &base, &names)?;
+    let baked = Baked::new(request.probe, &base, &names, progress, stop)?;
     if let Some(twice) =
         baked.inputs.iter().enumerate().find(|(i, a)| baked.inputs[..*i].iter().any(|b| a.name == b.name))
     {
@@ -95,13 +130,7 @@ pub fn convert(
             readings: textures.iter().map(|t| Reading::new(t, *tile)).collect(),
             clamp: request.clamp,
         };
-        let found =
-            stream(&job, &|rows| progress(done + rows, total), stop).map_err(|error| match error {
-                TextureError::Interrupted { .. } => {
-                    TextureError::Interrupted { folder: request.folder.clone() }
-                }
-                other => other,
-            })?;
+        let found = stream(&job, &|rows| progress(Progress::Rows { done: done + rows, total }), stop)?;
         for (texture, seen) in textures.iter_mut().zip(found.inputs) {
             texture.codes = seen.codes;
             texture.outside.add(&seen.outside);
@@ -109,7 +138,7 @@ pub fn convert(
         missing.add(&found.missing);
         written.extend(paths);
         done += height;
-        progress(done, total);
+        progress(Progress::Rows { done, total });
     }
     check_domain(request, &baked, &textures, &missing, &mut notes)?;
     look_at_values(&baked, &textures, &mut notes);
@@ -153,8 +182,11 @@ fn open_all(request: &Request, baked: &Baked, notes: &mut Vec<String>) -> Result
         let tiles = tiles(path)?;
         let first = tiles.values().next().unwrap_or(path);
         let (header, _) = files::open(first)?;
-        check_channels(input, first, &header)?;
-        if header.has_alpha {
+        let indices = model.resolve(&input.name).map_err(RemapError::from)?;
+        let is_own = |name: &String| model.resolve(name).is_ok_and(|i| i == indices);
+        let channel = request.channels.iter().find(|(name, _)| is_own(name)).map(|(_, channel)| *channel);
+        check_channels(input, first, &header, channel)?;
+        if header.has_alpha && channel != Some(Channel::A) {
             notes.push(format!("{}: the alpha channel of '{}' is not used", input.name, first.display()));
         }
         if path == first && tiles.len() > 1 {
@@ -165,8 +197,7 @@ fn open_all(request: &Request, baked: &Baked, notes: &mut Vec<String>) -> Result
                 tiles.len()
             ));
         }
-        let indices = model.resolve(&input.name).map_err(RemapError::from)?;
-        let asked = request.encodings.iter().find(|(n, _)| model.resolve(n).is_ok_and(|i| i == indices));
+        let asked = request.encodings.iter().find(|(name, _)| is_own(name));
         let encoding = encoding(input, first, &header, asked.map(|(_, e)| *e), notes);
         if let Some(other) = textures.first().filter(|other| other.tiles.keys().ne(tiles.keys())) {
             let list = |tiles: &Tiles| -> String {
@@ -182,20 +213,34 @@ fn open_all(request: &Request, baked: &Baked, notes: &mut Vec<String>) -> Result
             )));
         }
         let (codes, outside) = (Codes::default(), Outside::default());
-        textures.push(Texture { tiles, encoding, header, codes, outside });
+        textures.push(Texture { tiles, encoding, header, channel, codes, outside });
     }
     Ok(textures)
 }
 
-fn check_channels(input: &Input, path: &Path, header: &Header) -> Result<(), TextureError> {
+fn check_channels(
+    input: &Input,
+    path: &Path,
+    header: &Header,
+    channel: Option<Channel>,
+) -> Result<(), TextureError> {
     let wanted = if input.is_colour { 3 } else { 1 };
-    if header.channels == wanted {
+    let is_there = match channel {
+        Some(channel) => !input.is_colour && channel.plane(header).is_some(),
+        None => header.channels == wanted,
+    };
+    if is_there {
         return Ok(());
     }
+    let chosen = match channel {
+        Some(channel) => format!("; :{channel:?} takes one channel of several, alpha of PNG and TIFF alone"),
+        None if input.is_colour => String::new(),
+        None => format!("; '{}:r', ':g', ':b' or ':a' takes one of several", path.display()),
+    };
     let what =
         if input.is_colour { "a colour, which needs R, G and B" } else { "one number, which needs one" };
     Err(TextureError::Request(format!(
-        "'{}' has {} channel{} ({}), but {} is {what}",
+        "'{}' has {} channel{} ({}), but {} is {what}{chosen}",
         path.display(),
         header.channels,
         if header.channels == 1 { "" } else { "s" },
@@ -239,7 +284,16 @@ fn sizes(baked: &Baked, textures: &[Texture]) -> Result<Vec<(usize, usize)>, Tex
         for (input, texture) in baked.inputs.iter().zip(textures) {
             let path = texture.tiles[tile].as_path();
             let (header, _) = files::open(path)?;
-            check_channels(input, path, &header)?;
+            check_channels(input, path, &header, texture.channel)?;
+            if header.channels != texture.header.channels {
+                return Err(TextureError::Request(format!(
+                    "'{}' has the channels {}, another tile of {} has {}; all tiles must have the same",
+                    path.display(),
+                    header.names,
+                    input.name,
+                    texture.header.names
+                )));
+            }
             let size = (header.width, header.height);
             match first {
                 Some((other, wanted)) if wanted != size => {

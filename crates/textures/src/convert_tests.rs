@@ -60,6 +60,7 @@ fn request<'a>(probe: &'a Probe, textures: &[(&str, PathBuf)], folder: &Path) ->
         probe,
         base: probe.from.clone(),
         textures: textures.iter().map(|(n, p)| ((*n).to_owned(), p.clone())).collect(),
+        channels: Vec::new(),
         encodings: Vec::new(),
         format: None,
         clamp: false,
@@ -69,7 +70,7 @@ fn request<'a>(probe: &'a Probe, textures: &[(&str, PathBuf)], folder: &Path) ->
 }
 
 fn run(request: &Request) -> Result<Report, TextureError> {
-    convert(request, &|_, _| {}, &AtomicBool::new(false))
+    convert(request, &|_| {}, &AtomicBool::new(false))
 }
 
 fn names(folder: &Path) -> Vec<String> {
@@ -188,6 +189,95 @@ fn switches_and_carried_colours_equal_apply_too() {
     assert!(switched.iter().all(|count| *count > 100), "both levels occur: {switched:?}");
 }
 
+/// A target whose body lies under an interface: its colour depends on all that was searched, and on the source's colour.
+fn covered() -> Probe {
+    let mut probe = probe();
+    probe.to = Material::parse("gltf").unwrap();
+    probe.target_axes.remove(0);
+    for entry in &mut probe.entries {
+        entry.target.remove(0);
+    }
+    probe
+}
+
+/// The colours of bodies in a map, beside what `apply` says of them.
+fn bodies(probe: &Probe, textures: &[(&str, PathBuf)], base: &str) -> (Report, Vec<[f64; 2]>) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut request = request(probe, textures, folder.path());
+    request.base = Material::parse(base).unwrap();
+    let report = run(&request).unwrap();
+    let (_, planes) = load(&folder.path().join("out/base_color.exr"));
+    assert_eq!(planes.len(), 3);
+    let sources: Vec<(&str, Band)> = textures.iter().map(|(name, path)| (*name, load(path).1)).collect();
+    let texel = |texel: usize| {
+        let value = |(name, planes): &(&'static str, Band)| {
+            let at = |c: usize| f64::from(planes[c][texel]);
+            (*name, if planes.len() == 1 { Value::Number(at(0)) } else { Value::Colour([0, 1, 2].map(at)) })
+        };
+        let mut values: Vec<(&str, Value)> = Vec::new();
+        if !sources.iter().any(|(name, _)| *name == "diffuse") {
+            let index = request.base.model().resolve("diffuse").unwrap()[0];
+            values.push(("diffuse", request.base.values()[index].clone()));
+        }
+        for source in &sources {
+            let name = ["specular", "roughness", "diffuse"].into_iter().find(|name| *name == source.0);
+            values.push(value(&(name.unwrap(), source.1.clone())));
+        }
+        let expected = applied(probe, &values, "base_color");
+        (0..3).map(|c| [f64::from(planes[c][texel]), expected[c]]).collect::<Vec<_>>()
+    };
+    (report, (0..planes[0].len()).flat_map(texel).collect())
+}
+
+#[test]
+fn bodies_under_an_interface_are_carried_over_up_to_the_limit_of_their_colour() {
+    let probe = covered();
+    let folder = tempfile::tempdir().unwrap();
+    let texels = 24 * 24;
+    let paths = ["s.exr", "r.exr", "d.exr"].map(|n| folder.path().join(n));
+    store(&paths[0], "exr-float", 24, vec![random(1, texels, [0.02, 0.4])]);
+    store(&paths[1], "exr-float", 24, vec![random(2, texels, [0.01, 0.69])]);
+    store(&paths[2], "exr-float", 24, (3..6).map(|seed| random(seed, texels, [0.0, 1.0])).collect());
+    let textures =
+        [("specular", paths[0].clone()), ("roughness", paths[1].clone()), ("diffuse", paths[2].clone())];
+    // The colour in a texture, and two that are the same for all texels: the source is too bright for the target here and there.
+    for (textures, base, bright) in [
+        (&textures[..], "ward", 200..1500),
+        (&textures[..2], "ward:diffuse=0.65/0.65/0.05", 1..400),
+        (&textures[..2], "ward:diffuse=0.1/0.65/0.65", 1..400),
+        (&textures[..2], "ward:diffuse=0.9/0.8/0.1", 600..1500),
+    ] {
+        let (report, colours) = bodies(&probe, textures, base);
+        assert!(report.interpolation_error <= crate::TOLERANCE, "{base}: {}", report.interpolation_error);
+        assert!(report.notes.iter().all(|note| !note.contains("misses")), "{:?}", report.notes);
+        let count = colours.iter().filter(|[_, expected]| *expected == 1.0).count();
+        assert!(bright.contains(&count), "{base}: {count} colours at the limit");
+        let worst = colours.iter().map(|[found, expected]| (found - expected).abs()).fold(0.0, f64::max);
+        assert!(worst <= crate::TOLERANCE, "{base}: {worst}");
+    }
+}
+
+#[test]
+fn the_making_of_a_table_is_told_and_can_be_stopped() {
+    let probe = covered();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.exr");
+    store(&path, "exr-float", 8, vec![random(1, 64, [0.02, 0.4])]);
+    let request = request(&probe, &[("specular", path)], folder.path());
+    let stop = AtomicBool::new(false);
+    let first = |at: Progress| {
+        assert!(matches!(at, Progress::Table { parameter: "base_color", points: 1.. }), "{at:?}");
+        stop.store(true, Ordering::Relaxed);
+    };
+    let error = convert(&request, &first, &stop).unwrap_err();
+    assert!(stop.load(Ordering::Relaxed), "progress was told");
+    assert!(
+        matches!(error, TextureError::Interrupted { .. }) && error.to_string().contains("out"),
+        "{error}"
+    );
+    assert!(!request.folder.exists());
+}
+
 #[test]
 fn bands_and_threads_do_not_show_in_the_bytes() {
     let probe = probe();
@@ -293,7 +383,9 @@ fn faults_leave_the_folder_as_it_was() {
         assert!(before == after, "{what}");
     };
     let stop = AtomicBool::new(false);
-    let late = |done: usize, _: usize| stop.store(done >= 32, Ordering::Relaxed);
+    let late = |at: Progress| {
+        stop.store(matches!(at, Progress::Rows { done, .. } if done >= 32), Ordering::Relaxed);
+    };
     let error = convert(&request, &late, &stop).unwrap_err();
     assert!(matches!(error, TextureError::Interrupted { .. }), "{error}");
     assert!(error.to_string().contains("out"), "{error}");
@@ -309,6 +401,46 @@ fn faults_leave_the_folder_as_it_was() {
     let error = run(&onto_itself).unwrap_err().to_string();
     assert!(error.contains("one of the textures") || error.contains("outside"), "{error}");
     unchanged("a map onto its own texture");
+}
+
+#[test]
+fn a_channel_of_a_packed_texture_is_as_good_as_a_texture_of_its_own() {
+    let probe = probe();
+    let folder = tempfile::tempdir().unwrap();
+    let [unused, roughness, specular] =
+        [[0.0, 1.0], [0.01, 0.69], [0.02, 0.4]].map(|range| random(7, 32 * 32, range));
+    for extension in ["png", "tif", "exr"] {
+        let path = |name: &str| folder.path().join(format!("{name}.{extension}"));
+        let format = ["png16", "tiff16", "exr-half"].into_iter().find(|f| f.starts_with(extension)).unwrap();
+        store(&path("r"), format, 32, vec![roughness.clone()]);
+        store(&path("s"), format, 32, vec![specular.clone()]);
+        store(&path("orm"), format, 32, vec![unused.clone(), roughness.clone(), specular.clone()]);
+        let apart = [("roughness", path("r")), ("specular", path("s"))];
+        let together = [("roughness", path("orm")), ("specular", path("orm"))];
+        let mut maps = Vec::new();
+        for (textures, channels) in
+            [(apart, vec![]), (together, vec![("roughness", Channel::G), ("specular", Channel::B)])]
+        {
+            let mut request = request(&probe, &textures, folder.path());
+            request.channels =
+                channels.into_iter().map(|(name, channel)| (name.to_owned(), channel)).collect();
+            run(&request).unwrap();
+            let found = names(&request.folder).into_iter().filter(|name| name != "material.json");
+            maps.push(found.map(|name| load(&request.folder.join(name)).1).collect::<Vec<Band>>());
+            fs::remove_dir_all(&request.folder).unwrap();
+        }
+        assert!(maps[0].len() == 2 && maps[0] == maps[1], "{extension}");
+        let wrong = |name: &str, file: PathBuf, channel: Channel| {
+            let textures = [(name, file)];
+            let mut request = request(&probe, &textures, folder.path());
+            request.channels = vec![(name.to_owned(), channel)];
+            let error = run(&request).unwrap_err();
+            assert!(error.is_usage() && error.to_string().contains("one channel of several"), "{error}");
+        };
+        wrong("roughness", path("r"), Channel::G);
+        wrong("roughness", path("orm"), Channel::A);
+        wrong("diffuse", path("orm"), Channel::R);
+    }
 }
 
 #[test]

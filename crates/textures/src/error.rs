@@ -57,6 +57,11 @@ impl TextureError {
         matches!(self, Self::Io { source, .. } if source.kind() == io::ErrorKind::Interrupted)
     }
 
+    /// An end by the user; the folder is named by the one who knows it.
+    pub(crate) fn interrupted() -> Self {
+        Self::Interrupted { folder: PathBuf::new() }
+    }
+
     pub(crate) fn undecodable(path: &Path, reason: impl ToString) -> Self {
         Self::Undecodable { path: path.into(), reason: reason.to_string() }
     }

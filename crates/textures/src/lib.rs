@@ -4,6 +4,7 @@
 //! and written in bands of rows, by a thread for each file ([`convert`]).
 
 mod bake;
+mod carried;
 mod convert;
 mod encoding;
 mod error;
@@ -13,10 +14,10 @@ mod report;
 mod stream;
 mod udim;
 
-pub use bake::TOLERANCE;
-pub use convert::{Request, convert};
+pub use carried::TOLERANCE;
+pub use convert::{Progress, Request, convert};
 pub use encoding::Encoding;
 pub use error::TextureError;
-pub use files::{Container, Depth, Format};
+pub use files::{Channel, Container, Depth, Format};
 pub use lut::{Between, Lut, LutError, MAX_INPUTS};
 pub use report::Report;

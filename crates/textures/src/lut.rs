@@ -2,9 +2,9 @@
 //!
 //! A cell of the table holds the coefficients of its polynomial in the fractions, `a + b x + c y + d x y`, for four outputs
 //! side by side: one texel is four vector loads and three multiply-adds, without a gather. Where texels lie in the grid is
-//! found first, for a block of them: by a division where the levels of an axis are regular; where they are not, the division finds
-//! one of many short bins, and a comparison tells on which side of the bin's level. Nothing is resampled, so both are exact but for
-//! the rounding of `f32`.
+//! found first, for a block of them: by a division where the levels of an axis are regular; where they are not, the division
+//! finds one of many short bins, whose record is copied, and a comparison in registers tells on which side of the bin's level.
+//! Nothing is resampled, so both are exact but for the rounding of `f32`.
 
 use std::ops::Range;
 

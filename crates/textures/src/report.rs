@@ -106,6 +106,10 @@ pub(crate) fn report(
         for index in base.model().resolve(&input.name).unwrap_or_default() {
             let files: Vec<String> = texture.tiles.values().map(|p| file_name(p)).collect();
             let entry = json!({ "textures": files, "encoding": texture.encoding, "format": texture.header.format.name() });
+            let mut entry = entry;
+            if let Some(channel) = texture.channel {
+                entry["channel"] = format!("{channel:?}").into();
+            }
             source.insert(base.model().parameters[index].name.into(), entry);
         }
     }

@@ -29,16 +29,20 @@ pub(crate) struct Reading {
     depth: Depth,
     encoding: Encoding,
     channels: usize,
+    /// The plane that is used, if not all of them are.
+    plane: Option<usize>,
     codes: Codes,
 }
 
 impl Reading {
     pub(crate) fn new(texture: &Texture, tile: Option<u32>) -> Self {
+        let plane = texture.channel.and_then(|channel| channel.plane(&texture.header));
         Self {
             path: texture.tiles[&tile].clone(),
             depth: texture.header.format.depth,
             encoding: texture.encoding,
-            channels: texture.header.channels,
+            channels: texture.header.channels.max(plane.map_or(0, |plane| plane + 1)),
+            plane,
             codes: texture.codes.clone(),
         }
     }
@@ -162,8 +166,7 @@ pub(crate) fn stream(job: &Job, progress: &dyn Fn(usize), stop: &AtomicBool) -> 
         let height = job.size.1;
         for first in (0..height).step_by(job.band_rows) {
             if is_stopped(stop) {
-                // The folder is named by the one who knows it.
-                return Err(TextureError::Interrupted { folder: PathBuf::new() });
+                return Err(TextureError::interrupted());
             }
             let bands = next_bands(&readers, &mut found, job, first)?;
             let is_doomed =
@@ -213,6 +216,9 @@ fn reader<'s>(scope: &'s Scope<'s, '_>, reading: &'s Reading, job: &Job) -> Rece
             let mut planes = vec![Vec::new(); reading.channels];
             if let Err(error) = bands.read(first..(first + step).min(height), &mut planes) {
                 return drop(to.send(Err(error)));
+            }
+            if let Some(plane) = reading.plane {
+                planes = vec![planes.swap_remove(plane)];
             }
             for plane in &mut planes {
                 let is_byte = reading.depth == Depth::U8;

@@ -33,8 +33,9 @@ pub(crate) struct ApplyArgs {
 /// Maps of source parameters, instead of one value for each.
 #[derive(Args)]
 pub(crate) struct TextureArgs {
-    /// A source parameter's texture: .png, .tif or .exr; `<UDIM>` or 1001 in its name for all tiles. May be repeated
-    #[arg(long, value_name = "NAME=FILE", requires = "output")]
+    /// A source parameter's texture: .png, .tif or .exr; `<UDIM>` or 1001 in its name for all tiles; :r, :g, :b or :a after it for
+    /// one channel of several. May be repeated
+    #[arg(long, value_name = "NAME=FILE[:CHANNEL]", requires = "output")]
     pub(crate) texture: Vec<String>,
     /// A source parameter that is the same for all texels; as NAME=VALUE alone
     #[arg(long, value_name = "NAME=VALUE")]

@@ -1,20 +1,24 @@
 //! `lookmatch apply --texture`: maps of a source's parameters through a probe.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use lookmatch_remap::Probe;
-use lookmatch_textures::{Encoding, Format, Report, Request, convert};
+use lookmatch_textures::{Channel, Encoding, Format, Progress, Report, Request, convert};
 
 use super::apply::{pairs, source};
 use crate::Usage;
 use crate::args::ApplyArgs;
-use crate::output::{bar, print, print_json, table};
+use crate::output::{bar, print, print_json, spinner, table};
 use crate::renderers::interruption;
 
 pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
     let probe = Probe::read(&args.probe)?;
-    let textures: Vec<(String, PathBuf)> =
-        pairs(&args.textures.texture, "NAME=FILE")?.into_iter().map(|(n, f)| (n, f.into())).collect();
+    let (mut textures, mut channels) = (Vec::new(), Vec::new());
+    for (name, file) in pairs(&args.textures.texture, "NAME=FILE")? {
+        let (path, channel) = packed(&file);
+        channels.extend(channel.map(|channel| (name.clone(), channel)));
+        textures.push((name, path));
+    }
     let textured: Vec<&str> = textures.iter().map(|(name, _)| name.as_str()).collect();
     let base = source(&probe, args, &textured)?;
     let encodings = pairs(&args.textures.encoding, "NAME=linear or NAME=srgb")?;
@@ -30,6 +34,7 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
         probe: &probe,
         base,
         textures,
+        channels,
         encodings: encodings.collect::<Result<_, _>>()?,
         format: format.transpose()?,
         clamp: args.clamp,
@@ -37,12 +42,19 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
         band_rows: None,
     };
     let stop = interruption()?;
-    let bar = bar(0, "rows");
-    let progress = |done: usize, total: usize| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
+    let (spinner, bar) = (spinner("reading the probe"), bar(0, "rows"));
+    let progress = |at: Progress| match at {
+        Progress::Table { parameter, points } => {
+            spinner.set_message(format!("table of {parameter}: {points} points"));
+        }
+        Progress::Rows { done, total } => {
+            spinner.finish_and_clear();
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        }
     };
     let report = convert(&request, &progress, &stop);
+    spinner.finish_and_clear();
     bar.finish_and_clear();
     let report = report?;
     for note in &report.notes {
@@ -52,6 +64,13 @@ pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
         return print_json(&report);
     }
     print(&text(&report, &request))
+}
+
+/// A file, and the channel that follows it: `orm.png:g`. A file of that whole name is itself.
+fn packed(file: &str) -> (PathBuf, Option<Channel>) {
+    let channel = |(path, letter): (&str, &str)| Some((path.into(), Some(Channel::parse(letter)?)));
+    let found = if Path::new(file).exists() { None } else { file.rsplit_once(':').and_then(channel) };
+    found.unwrap_or((file.into(), None))
 }
 
 /// The target's parameters: maps, then numbers.

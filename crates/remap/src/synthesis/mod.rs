@@ -43,8 +43,6 @@ const LEAST: f64 = 1e-3;
 /// synthesised, and so on pictures that the synthesis did not know.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SynthesisRecord {
-    /// Pictures that were rendered to start from, and learnt from later.
-    pub rendered: usize,
     /// Components under the point light and under the environment.
     pub components: [usize; 2],
     /// Rendered pictures that were held out: synthesised first.
@@ -94,7 +92,6 @@ impl SynthesisRecord {
         let held_out = self.held_out + other.held_out;
         let sum = self.mean * self.held_out as f64 + other.mean * other.held_out as f64;
         Self {
-            rendered: self.rendered + other.rendered,
             components: [0, 1].map(|k| self.components[k].max(other.components[k])),
             held_out,
             mean: sum / held_out.max(1) as f64,
@@ -347,7 +344,6 @@ impl Synthesis {
         let most = errors.get((0.95 * errors.len() as f64) as usize).copied().or(errors.last().copied());
         let components = |kind: usize| self.components.get(kind).map_or(0, Components::len);
         (!self.learnt.is_empty()).then(|| SynthesisRecord {
-            rendered: self.learnt.len(),
             components: [0, 1].map(components),
             held_out: errors.len(),
             mean: errors.iter().sum::<f64>() / errors.len().max(1) as f64,

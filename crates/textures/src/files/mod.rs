@@ -133,6 +133,40 @@ impl Format {
     }
 }
 
+/// A channel of a packed texture, which holds several parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Red.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+    /// Alpha, of PNG and TIFF files.
+    A,
+}
+
+impl Channel {
+    /// The channel of a letter, of either case.
+    pub fn parse(name: &str) -> Option<Self> {
+        let all = [("r", Self::R), ("g", Self::G), ("b", Self::B), ("a", Self::A)];
+        all.into_iter().find(|(letter, _)| name.eq_ignore_ascii_case(letter)).map(|(_, channel)| channel)
+    }
+
+    /// Its plane in a file; `None` where the file does not have it.
+    pub(crate) fn plane(self, header: &Header) -> Option<usize> {
+        let is_packed = header.channels == 3;
+        match self {
+            Self::R => is_packed.then_some(0),
+            Self::G => is_packed.then_some(1),
+            Self::B => is_packed.then_some(2),
+            Self::A => {
+                (header.has_alpha && header.format.container != Container::Exr).then_some(header.channels)
+            }
+        }
+    }
+}
+
 /// What a file says before its texels.
 #[derive(Clone, Debug)]
 pub(crate) struct Header {
@@ -151,7 +185,8 @@ pub(crate) struct Header {
 
 /// Reads bands of rows, each once and from top to bottom.
 pub(crate) trait Bands: Send {
-    /// Fills one plane for each channel with some rows; integers become 0 to 1, nothing is decoded.
+    /// Fills one plane for each channel with some rows, one more for the alpha of PNG and TIFF; integers become 0 to 1, nothing is
+    /// decoded.
     fn read(&mut self, rows: Range<usize>, planes: &mut [Vec<f32>]) -> Result<(), TextureError>;
 }
 
