@@ -333,7 +333,7 @@ fn models_are_linear_in_what_they_declare_and_search_nothing_linear_unaware() {
     for model in registry().iter().filter(|model| model.load.is_none()) {
         let index = |name: &&str| model.parameters.iter().position(|p| p.name == *name);
         for name in model.linear {
-            let found = is_linear(model, index(&name).expect("a parameter"), &mut draw);
+            let found = is_linear(model, index(name).expect("a parameter"), &mut draw);
             assert_eq!(found, [true; 2], "{} in {name}", model.name);
             declared += 1;
         }
