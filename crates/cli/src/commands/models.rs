@@ -101,7 +101,11 @@ fn roles(model: &Model) -> String {
         [] => "it is no target".to_owned(),
         axes => format!("as a target it is searched over {}", axes.join(", ")),
     };
-    format!("{source}; {target}")
+    let linear = match model.linear {
+        [] => String::new(),
+        names => format!("; it is linear in {}", names.join(", ")),
+    };
+    format!("{source}; {target}{linear}")
 }
 
 /// How many presets a model has, and the first of them.

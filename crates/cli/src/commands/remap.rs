@@ -42,6 +42,9 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
             "note: only one of the models has a Fresnel effect; --mask keeps silhouettes from ruling the match"
         );
     }
+    if args.refine && !named.is_empty() {
+        eprintln!("note: --refine leaves matches with other renderers on the lattice: noise hides what lies between its levels");
+    }
     let started = Instant::now();
     let (probe, costs, stage) = match named.is_empty() {
         true => (search(&plan, args, &stopped)?, Vec::new(), None),
