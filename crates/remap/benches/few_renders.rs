@@ -10,7 +10,7 @@
 //! A target material is rendered once under each of two lights. `genetic-guarnera2018` is the paper's algorithm as published.
 
 use lookmatch_materials::by_name;
-use lookmatch_remap::{Axis, Options, Plan, Probe, Stage, Strategy, remap};
+use lookmatch_remap::{Axis, Options, Plan, Probe, Stage, Strategy, SynthesisRecord, remap};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -138,7 +138,10 @@ fn together(pair: &Pair, size: usize, stage: &Stage) {
             row.add(&found, &best);
             row.print(&format!("  {SOURCES} {name:<14}{method}"), begin.elapsed().as_secs_f64());
             if let Some(record) = found.totals.synthesis {
-                println!("    {record:?}");
+                let SynthesisRecord { components: [point, environment], held_out, mean, most } = record;
+                println!(
+                    "    {point} + {environment} components; {held_out} held out: off by {mean:.3} on average, 95 % by {most:.3}"
+                );
             }
         }
     }

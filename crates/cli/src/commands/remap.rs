@@ -43,7 +43,9 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         );
     }
     if args.refine && !named.is_empty() {
-        eprintln!("note: --refine leaves matches with other renderers on the lattice: noise hides what lies between its levels");
+        eprintln!(
+            "note: --refine leaves matches with other renderers on the lattice: noise hides what lies between its levels"
+        );
     }
     let started = Instant::now();
     let (probe, costs, stage) = match named.is_empty() {

@@ -65,28 +65,27 @@ impl Components {
 
     /// A picture as a sum of components.
     pub(crate) fn loadings(&self, picture: &[f32]) -> Loadings {
-        let centred = less(picture, &self.mean);
-        self.loadings_of(&centred)
+        self.parted(picture).0
     }
 
-    fn loadings_of(&self, centred: &[f32]) -> Loadings {
-        let values: Vec<f64> = self.directions.iter().map(|d| inner_product(d, centred)).collect();
-        let held: f64 = values.iter().map(|v| v * v).sum();
-        Loadings { rest: (inner_product(centred, centred) - held).max(0.0), values }
+    /// The loadings of a picture, and what is left of it.
+    fn parted(&self, picture: &[f32]) -> (Loadings, Vec<f32>) {
+        let mut rest = less(picture, &self.mean);
+        let values: Vec<f64> = self.directions.iter().map(|d| inner_product(d, &rest)).collect();
+        let parts = self.directions.iter().zip(&values);
+        parts.for_each(|(direction, value)| add(&mut rest, direction, -value as f32));
+        // A difference of squares would be lost in rounding where little is left.
+        (Loadings { rest: inner_product(&rest, &rest), values }, rest)
     }
 
     /// [`Components::loadings`] of a picture of which no more than `tolerance` may be left: what is left beyond becomes a
     /// component of its own.
     pub(crate) fn extended(&mut self, picture: &[f32], tolerance: f64) -> Loadings {
-        let mut rest = less(picture, &self.mean);
-        let mut loadings = self.loadings_of(&rest);
+        let (mut loadings, mut rest) = self.parted(picture);
         if loadings.rest <= tolerance * tolerance || self.directions.len() == MOST {
             return loadings;
         }
-        for (direction, value) in self.directions.iter().zip(&loadings.values) {
-            add(&mut rest, direction, -value as f32);
-        }
-        let length = inner_product(&rest, &rest).sqrt();
+        let length = loadings.rest.sqrt();
         rest.iter_mut().for_each(|v| *v /= length as f32);
         self.directions.push(rest);
         loadings.values.push(length);

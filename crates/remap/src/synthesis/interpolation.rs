@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     fn points(count: usize) -> Vec<Vec<f64>> {
-        (0..count).map(|k| vec![(k as f64 * 0.618_034).fract(), (k as f64 * 0.754_878).fract()]).collect()
+        (0..count).map(|k| vec![(k as f64 * 0.754_878).fract(), (k as f64 * 0.569_840).fract()]).collect()
     }
 
     #[test]

@@ -23,7 +23,7 @@ use components::{Components, Loadings};
 use interpolation::{Interpolation, Metric};
 
 /// Fitness that the components may leave out of the pictures that they are made of, as root mean square.
-const LEFT_OUT: f64 = 0.02;
+const LEFT_OUT: f64 = 0.005;
 /// Points with a switch of their own that need a function of their own, at least.
 const FEWEST: usize = 6;
 /// Levels between the ends of an axis in which the model is linear.
@@ -31,7 +31,7 @@ const BETWEEN: usize = 8;
 /// Rendered pictures after which functions are no longer fitted for each new one ...
 const MANY: usize = 120;
 /// ... but for those that were further off than this, in fitness.
-const OFF: f64 = 0.05;
+const OFF: f64 = 0.02;
 /// Points beyond which a function of its own is put through those around each place ...
 const WHOLE: usize = 400;
 /// ... of which there are so many.
