@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use lookmatch_remap::{Entry, Loss, LossClass, Noise, Probe};
+use lookmatch_remap::{Entry, Loss, LossClass, Noise, Probe, SynthesisRecord, Totals};
 use serde::Serialize;
 
 /// Prints a text. A reader that went away (`| head`) is no error.
@@ -58,6 +58,22 @@ pub(crate) fn loss_table(losses: &[Loss]) -> String {
     if let Some([mean, worst]) = losses.iter().find_map(|loss| loss.nrmsd) {
         text +=
             &format!("  what is bounded or lost: masked NRMSD {mean:.4} on average, {worst:.4} at worst\n");
+    }
+    text
+}
+
+/// How many targets were rendered for how many comparisons, and how far synthesised pictures could be trusted.
+pub(crate) fn renders_text(probe: &Probe) -> String {
+    let Totals { evaluations, lattice_points, rendered, synthesis } = &probe.totals;
+    let Some(rendered) = rendered else { return String::new() };
+    let each = *rendered as f64 / probe.entries.len() as f64;
+    let mut text = format!(
+        "{rendered} of {lattice_points} target materials rendered ({each:.1} for each source), {evaluations} comparisons\n"
+    );
+    if let Some(SynthesisRecord { components: [point, environment], held_out, mean, most, .. }) = synthesis {
+        text += &format!(
+            "synthesised from {point} + {environment} components; {held_out} candidates rendered after they were synthesised differ by {mean:.3} in fitness on average, 95 % by {most:.3} or less\n"
+        );
     }
     text
 }

@@ -21,6 +21,7 @@ mod inverse;
 mod journal;
 mod losses;
 mod options;
+mod pairing;
 mod pairs;
 mod picture_checks;
 mod plan;

@@ -7,7 +7,7 @@ use crate::args::InspectArgs;
 use crate::commands::check_output;
 use crate::commands::fit::fit_text;
 use crate::commands::invert::derived_text;
-use crate::output::{loss_table, noise_text, print, print_json, score, table};
+use crate::output::{loss_table, noise_text, print, print_json, renders_text, score, table};
 
 /// Worst points that are listed.
 const WORST: usize = 5;
@@ -61,6 +61,7 @@ fn summary(probe: &Probe) -> serde_json::Value {
     json!({
         "from": probe.from, "to": probe.to, "program": probe.program, "version": probe.version,
         "strategy": probe.strategy, "search": probe.search, "seed": probe.seed, "preset": probe.preset,
+        "pairs": probe.pairs, "refined": probe.refined,
         "metric": probe.metric, "scene": probe.scene.name, "size": probe.size,
         "source_axes": probe.source_axes, "target_axes": probe.target_axes.iter().enumerate().map(axis).collect::<Vec<_>>(),
         "renderers": probe.renderers.iter().map(|r| json!({ "name": r.name, "version": r.version })).collect::<Vec<_>>(),
@@ -99,6 +100,14 @@ fn text(probe: &Probe) -> String {
         probe.scene.name,
         probe.size,
     );
+    text += &renders_text(probe);
+    for pair in &probe.pairs {
+        let followers = if pair.targets.is_empty() { "nothing".into() } else { pair.targets.join(", ") };
+        text += &format!("{followers} followed {}\n", pair.source);
+    }
+    if probe.refined {
+        text += "targets lie between the levels of the lattice where that is better\n";
+    }
     if let (Some(sampling), [_, ..]) = (probe.sampling, &probe.renderers[..]) {
         let names = probe.renderers.iter().map(|r| format!("{} {}", r.name, r.version));
         let names: Vec<String> = names.collect();

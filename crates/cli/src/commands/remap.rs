@@ -8,7 +8,7 @@ use std::time::Instant;
 use lookmatch_materials::split_name;
 use lookmatch_remap::{
     Assignment, Counts, CrossStage, Endpoint, Event, Options, Plan, Preset, Probe, RemapError, Sampling,
-    Side, Stage, Strategy, SynthesisRecord, Totals, journal_path, losses, remap, remap_across,
+    Side, Stage, Strategy, journal_path, losses, remap, remap_across,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::fit::{FIT_POINTS, fit_summary, fit_to};
 use crate::commands::{check_output, create_folder};
-use crate::output::{bar, loss_table, noise_text, print_json};
+use crate::output::{bar, loss_table, noise_text, print_json, renders_text};
 use crate::renderers::{Renderers, interruption, renderer_of};
 use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
@@ -89,22 +89,6 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         return print_json(&summary);
     }
     Ok(())
-}
-
-/// How many targets were rendered for how many comparisons, and how far synthesised pictures could be trusted.
-fn renders_text(probe: &Probe) -> String {
-    let Totals { evaluations, lattice_points, rendered, synthesis } = &probe.totals;
-    let Some(rendered) = rendered else { return String::new() };
-    let each = *rendered as f64 / probe.entries.len() as f64;
-    let mut text = format!(
-        "{rendered} of {lattice_points} target materials rendered ({each:.1} for each source), {evaluations} comparisons\n"
-    );
-    if let Some(SynthesisRecord { components: [point, environment], held_out, mean, most, .. }) = synthesis {
-        text += &format!(
-            "synthesised from {point} + {environment} components; {held_out} candidates rendered after they were synthesised differ by {mean:.3} in fitness on average, 95 % by {most:.3} or less\n"
-        );
-    }
-    text
 }
 
 /// What pictures of a renderer have cost.
