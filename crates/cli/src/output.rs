@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use lookmatch_remap::{Entry, Loss, LossClass, Noise, Probe, SynthesisRecord, Totals};
+use lookmatch_remap::{Entry, Loss, LossClass, Noise, Probe, Strategy, SynthesisRecord, Totals};
 use serde::Serialize;
 
 /// Prints a text. A reader that went away (`| head`) is no error.
@@ -70,12 +70,25 @@ pub(crate) fn renders_text(probe: &Probe) -> String {
     let mut text = format!(
         "{rendered} of {lattice_points} target materials rendered ({each:.1} for each source), {evaluations} comparisons\n"
     );
+    if let Some((saved, alone)) = saved(probe) {
+        text += &format!(
+            "starting from neighbours saved about {saved} of {alone} comparisons, those of searches like the first\n"
+        );
+    }
     if let Some(SynthesisRecord { components: [point, environment], held_out, mean, most, .. }) = synthesis {
         text += &format!(
             "synthesised from {point} + {environment} components; {held_out} candidates rendered after they were synthesised differ by {mean:.3} in fitness on average, 95 % by {most:.3} or less\n"
         );
     }
     text
+}
+
+/// Comparisons that a constrained strategy saved, and how many there would be if every source were searched as the first
+/// was, which no neighbour led; nothing where searches share more than that.
+pub(crate) fn saved(probe: &Probe) -> Option<(usize, usize)> {
+    let is_led = probe.strategy == Strategy::Constrained && probe.search == "genetic";
+    let alone = probe.entries.first().filter(|_| is_led)?.evaluations * probe.entries.len();
+    alone.checked_sub(probe.totals.evaluations).filter(|saved| *saved > 0).map(|saved| (saved, alone))
 }
 
 /// What noise leaves unknown, and what failed.

@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::fit::{FIT_POINTS, fit_summary, fit_to};
 use crate::commands::{check_output, create_folder};
-use crate::output::{bar, loss_table, noise_text, print_json, renders_text};
+use crate::output::{bar, loss_table, noise_text, print_json, renders_text, saved};
 use crate::renderers::{Renderers, interruption, renderer_of};
 use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
@@ -82,7 +82,7 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         let summary = json!({
             "probe": args.output, "source_points": probe.entries.len(), "seconds": seconds,
             "evaluations": probe.totals.evaluations, "rendered": probe.totals.rendered,
-            "synthesis": probe.totals.synthesis, "lattice_points": probe.totals.lattice_points,
+            "synthesis": probe.totals.synthesis, "saved": saved(&probe).map(|(saved, _)| saved), "lattice_points": probe.totals.lattice_points,
             "mean_fitness": mean, "saturated": saturated, "losses": losses, "validation": validation,
             "renderers": costs, "failed": probe.entries.len() - probe.found().count(),
         });
