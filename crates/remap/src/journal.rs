@@ -25,12 +25,14 @@ struct Header {
     plan: Plan,
 }
 
-/// One line: the place of the source point in lexicographic order, the indices of its target, the entry.
+/// One line: the place of the source point in lexicographic order, the indices of its target, the entry, what was rendered.
 #[derive(Serialize, Deserialize)]
 struct Line {
     place: usize,
     point: Vec<u32>,
     entry: Entry,
+    /// Targets that were rendered for it and for no point before.
+    rendered: Vec<u64>,
 }
 
 /// A file of finished source points.
@@ -45,7 +47,7 @@ impl Journal {
     pub(crate) fn open(
         path: &Path,
         plan: &Plan,
-        mut found: impl FnMut(usize, Vec<u32>, Entry),
+        mut found: impl FnMut(usize, Vec<u32>, Entry, &[u64]),
     ) -> Result<Self, RemapError> {
         let failed = |source| RemapError::Write { path: path.to_owned(), source };
         let header = Header { program: env!("CARGO_PKG_VERSION").into(), plan: plan.clone() };
@@ -57,7 +59,7 @@ impl Journal {
                 for line in lines {
                     let Ok(parsed) = serde_json::from_str::<Line>(line) else { break };
                     kept.push(line.to_owned());
-                    found(parsed.place, parsed.point, parsed.entry);
+                    found(parsed.place, parsed.point, parsed.entry, &parsed.rendered);
                 }
             }
         }
@@ -69,9 +71,15 @@ impl Journal {
     }
 
     /// Adds a finished source point.
-    pub(crate) fn append(&mut self, place: usize, point: &[u32], entry: &Entry) -> Result<(), RemapError> {
+    pub(crate) fn append(
+        &mut self,
+        place: usize,
+        point: &[u32],
+        entry: &Entry,
+        rendered: Vec<u64>,
+    ) -> Result<(), RemapError> {
         let failed = |source| RemapError::Write { path: self.path.clone(), source };
-        let line = Line { place, point: point.to_vec(), entry: entry.clone() };
+        let line = Line { place, point: point.to_vec(), entry: entry.clone(), rendered };
         let text = serde_json::to_string(&line).map_err(|e| failed(e.into()))?;
         writeln!(self.file, "{text}").and_then(|()| self.file.flush()).map_err(failed)
     }

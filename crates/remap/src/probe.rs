@@ -158,8 +158,7 @@ pub struct Totals {
     pub evaluations: usize,
     /// Points of the target lattice.
     pub lattice_points: usize,
-    /// Distinct target materials that were rendered for these comparisons since the remap was last resumed; absent in older
-    /// files.
+    /// Distinct target materials that were rendered for these comparisons; absent in older files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rendered: Option<usize>,
     /// How far synthesised pictures could be trusted, where there were any.

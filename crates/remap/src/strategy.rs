@@ -204,7 +204,8 @@ fn run(
     let total = sources.len();
     let mut found: Vec<Option<(Point, Entry)>> = vec![None; total];
     let mut journal = match state {
-        Some(path) => Some(Journal::open(path, plan, |place, point, entry| {
+        Some(path) => Some(Journal::open(path, plan, |place, point, entry, rendered| {
+            syntheses.recall(rendered);
             if let Some(slot) = found.get_mut(place) {
                 *slot = Some((point, entry));
             }
@@ -260,7 +261,7 @@ fn run(
             let matched = eye.refined(plan, &lattice, matched, (&pairing, &led), (&syntheses, stop));
             let Matched { best, compared, entry } = matched.map_err(|e| interrupted(e, done, total))?;
             if let Some(journal) = &mut journal {
-                journal.append(place, &best, &entry)?;
+                journal.append(place, &best, &entry, syntheses.counted())?;
             }
             found[place] = Some((best, entry));
             done += 1;
@@ -272,7 +273,8 @@ fn run(
     }
     let mut probe =
         Probe::new(plan, found.into_iter().flatten().map(|(_, entry)| entry).collect(), lattice.len());
-    probe.totals.rendered = Some(table.map_or_else(|| syntheses.rendered(), |(table, _)| table.len()));
+    let rendered = table.map_or_else(|| syntheses.rendered(), |(table, _)| table.len());
+    probe.totals.rendered = Some(rendered).filter(|rendered| *rendered > 0);
     probe.totals.synthesis = syntheses.record();
     Ok(probe)
 }

@@ -23,7 +23,7 @@ use components::{Components, Loadings};
 use interpolation::{Interpolation, Metric};
 
 /// Fitness that the components may leave out of the pictures that they are made of, as root mean square.
-const LEFT_OUT: f64 = 0.005;
+const LEFT_OUT: f64 = 0.01;
 /// Points with a switch of their own that need a function of their own, at least.
 const FEWEST: usize = 6;
 /// Levels between the ends of an axis in which the model is linear.
@@ -31,7 +31,7 @@ const BETWEEN: usize = 8;
 /// Rendered pictures after which functions are no longer fitted for each new one ...
 const MANY: usize = 120;
 /// ... but for those that were further off than this, in fitness.
-const OFF: f64 = 0.02;
+const OFF: f64 = 0.05;
 /// Points beyond which a function of its own is put through those around each place ...
 const WHOLE: usize = 400;
 /// ... of which there are so many.
@@ -57,7 +57,15 @@ pub struct SynthesisRecord {
 #[derive(Default)]
 pub(crate) struct Syntheses {
     families: Mutex<BTreeMap<Key, Synthesis>>,
-    rendered: Mutex<HashSet<Key>>,
+    rendered: Mutex<RenderedTargets>,
+}
+
+/// Targets that were rendered, as numbers that tell them apart.
+#[derive(Default)]
+struct RenderedTargets {
+    all: HashSet<u64>,
+    /// Those that no journal knows yet.
+    new: Vec<u64>,
 }
 
 /// A family that is being asked.
@@ -69,14 +77,37 @@ impl Syntheses {
         self.families.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn targets(&self) -> MutexGuard<'_, RenderedTargets> {
+        self.rendered.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Counts targets that a search asked for, each once.
-    pub(crate) fn count(&self, targets: &[Material]) {
-        self.rendered.lock().unwrap_or_else(PoisonError::into_inner).extend(targets.iter().map(key));
+    pub(crate) fn count(&self, materials: &[Material]) {
+        let mut targets = self.targets();
+        for material in materials {
+            // FNV-1a over words.
+            let number = key(material).iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| {
+                (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
+            });
+            if targets.all.insert(number) {
+                targets.new.push(number);
+            }
+        }
+    }
+
+    /// Targets that were counted since this was last asked.
+    pub(crate) fn counted(&self) -> Vec<u64> {
+        std::mem::take(&mut self.targets().new)
+    }
+
+    /// Targets that an earlier run counted.
+    pub(crate) fn recall(&self, numbers: &[u64]) {
+        self.targets().all.extend(numbers);
     }
 
     /// Targets that were asked for.
     pub(crate) fn rendered(&self) -> usize {
-        self.rendered.lock().unwrap_or_else(PoisonError::into_inner).len()
+        self.targets().all.len()
     }
 
     /// How well synthesis went, over all families.
@@ -142,6 +173,8 @@ struct Stratum {
     function: Option<Surface>,
     metric: Option<Metric>,
     is_stale: bool,
+    /// Components of each kind of picture when the function was fitted.
+    lengths: Vec<usize>,
     /// Forecast loadings.
     foreseen: HashMap<Point, Vec<f64>>,
 }
@@ -316,21 +349,17 @@ impl Synthesis {
             let new: Vec<&(usize, Vec<f64>)> =
                 group.iter().filter(|(k, _)| !stratum.foreseen.contains_key(&points[*k])).collect();
             let places: Vec<Vec<f64>> = new.iter().map(|(_, place)| place.clone()).collect();
-            for ((k, _), loadings) in new.iter().zip(stratum.loadings_at(&places, &lengths)) {
+            for ((k, _), loadings) in new.iter().zip(stratum.loadings_at(&places)) {
                 stratum.foreseen.insert(points[*k].clone(), loadings);
             }
             for (k, _) in &group {
-                distances[*k] = self
-                    .shares
-                    .iter()
-                    .zip(seen)
-                    .fold((0.0, 0), |(sum, first), (share, seen)| {
-                        let foreseen = stratum.foreseen[&points[*k]]
-                            .get(first..first + seen.values.len())
-                            .unwrap_or(&[]);
-                        (sum + share * distance(seen, foreseen), first + seen.values.len())
-                    })
-                    .0;
+                let foreseen = &stratum.foreseen[&points[*k]];
+                let mut first = 0;
+                distances[*k] = 0.0;
+                for ((share, seen), length) in self.shares.iter().zip(seen).zip(&stratum.lengths) {
+                    distances[*k] += share * distance(seen, &foreseen[first..first + length]);
+                    first += length;
+                }
             }
             is_known = true;
         }
@@ -360,6 +389,7 @@ impl Stratum {
         }
         self.foreseen.clear();
         self.is_stale = false;
+        self.lengths = lengths.to_vec();
         let values: Vec<Vec<f64>> = self.loadings.iter().map(|row| joined(row, lengths)).collect();
         let axes = self.points.first().map_or(0, Vec::len);
         let known = self.metric.take().unwrap_or_else(|| Metric::plain(axes));
@@ -374,7 +404,8 @@ impl Stratum {
         self.function = Some(function.unwrap_or(Surface::Nearest));
     }
 
-    fn loadings_at(&self, places: &[Vec<f64>], lengths: &[usize]) -> Vec<Vec<f64>> {
+    fn loadings_at(&self, places: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let lengths = &self.lengths;
         let nearest = |place: &Vec<f64>| {
             let around = self.around(place, 1, self.points.len());
             around.first().map_or_else(Vec::new, |k| joined(&self.loadings[*k], lengths))
