@@ -1,6 +1,6 @@
 //! How few targets a remap has to render: each method beside the proven optimum.
 //!
-//! `cargo bench -p lookmatch-remap --bench few_renders [-- SIZE]` prints, for Ward to GGX, Ashikhmin-Shirley to Beckmann and
+//! `cargo bench -p lookmatch-remap --bench few_renders [-- SIZE [SOURCE [METHOD]]]` prints, for Ward to GGX, Ashikhmin-Shirley to Beckmann and
 //! Lafortune to Ward, on the built-in renderer, whose renders are counted as if they were dear:
 //!
 //! - alone: 56 source materials at random values, each remapped as if there were no others. Mean and worst ratio of the fitness
@@ -97,7 +97,7 @@ impl Row {
 }
 
 /// Each source of a plan on its own.
-fn alone(pair: &Pair, size: usize, stage: &Stage) {
+fn alone(pair: &Pair, size: usize, stage: &Stage, is_wanted: &dyn Fn(&str) -> bool) {
     let mut random = Pcg64::seed_from_u64(6);
     let mut truth = plan(pair, "exhaustive", size, Strategy::Unconstrained);
     let counts = pair.counts.iter().map(|(alone, _)| *alone);
@@ -109,7 +109,7 @@ fn alone(pair: &Pair, size: usize, stage: &Stage) {
         best.totals.rendered.unwrap_or(0),
         begin.elapsed().as_secs_f64()
     );
-    for method in METHODS {
+    for method in METHODS.into_iter().filter(|method| is_wanted(method)) {
         let (mut row, begin) = (Row::default(), std::time::Instant::now());
         for entry in &best.entries {
             let mut one = Plan { search: method.into(), source_axes: Vec::new(), ..truth.clone() };
@@ -123,7 +123,7 @@ fn alone(pair: &Pair, size: usize, stage: &Stage) {
 }
 
 /// A whole remap.
-fn together(pair: &Pair, size: usize, stage: &Stage) {
+fn together(pair: &Pair, size: usize, stage: &Stage, is_wanted: &dyn Fn(&str) -> bool) {
     for (strategy, name) in
         [(Strategy::Unconstrained, "unconstrained"), (Strategy::Constrained, "constrained")]
     {
@@ -131,7 +131,7 @@ fn together(pair: &Pair, size: usize, stage: &Stage) {
         let counts = pair.counts.iter().map(|(_, together)| *together);
         truth.source_axes = axes(&truth, counts, &mut |k, count| k as f64 / (count - 1) as f64);
         let best: Vec<f64> = run(&truth, stage).entries.iter().map(|entry| entry.fitness).collect();
-        for method in WHOLE {
+        for method in WHOLE.into_iter().filter(|method| is_wanted(method)) {
             let begin = std::time::Instant::now();
             let found = run(&Plan { search: method.into(), ..truth.clone() }, stage);
             let mut row = Row::default();
@@ -150,7 +150,8 @@ fn together(pair: &Pair, size: usize, stage: &Stage) {
 fn main() {
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     let size = arguments.next().and_then(|a| a.parse().ok()).unwrap_or(128);
-    let only = arguments.next();
+    let (only, method) = (arguments.next(), arguments.next());
+    let is_wanted = |name: &str| method.as_ref().is_none_or(|method| method == name);
     println!(
         "{:<52}{:>10}{:>10}{:>10}{:>10}{:>9}",
         "fitness over optimum, renders per source", "mean", "worst", "renders", "most", "s"
@@ -158,7 +159,7 @@ fn main() {
     for pair in PAIRS.iter().filter(|pair| only.as_ref().is_none_or(|only| only == pair.from)) {
         println!("{} -> {}, {size} px", pair.from, pair.to);
         let stage = Stage::prepare(&plan(pair, "genetic", size, Strategy::Unconstrained)).expect("the scene");
-        alone(pair, size, &stage);
-        together(pair, size, &stage);
+        alone(pair, size, &stage, &is_wanted);
+        together(pair, size, &stage, &is_wanted);
     }
 }
