@@ -58,18 +58,17 @@ impl Synthesis {
         Synthesis { first: First::HalfRate, ..Synthesis::default() }
     }
 
-    /// The points that are evaluated where nothing is known; of the axes that are `linear`, the ends.
+    /// The points within bounds that are evaluated where nothing is known; of the axes that are `linear`, the ends.
     fn first(&self, problem: &Problem, linear: &[bool]) -> Vec<Point> {
-        let whole = Bounds::full(problem.lattice);
+        let bounds = &problem.bounds;
         match self.first {
             First::HalfRate => {
-                let half: Vec<Point> =
-                    whole.points().filter(|point| is_half(&problem.lattice.axes, point)).collect();
+                let half: Vec<Point> = bounds.points().filter(|point| is_half(bounds, point)).collect();
                 // Batches that are spread over the lattice themselves.
                 let stride = half.len().div_ceil(BATCH);
                 (0..stride).flat_map(|first| half.iter().skip(first).step_by(stride).cloned()).collect()
             }
-            First::Spread => first_points(&problem.lattice.axes, &whole, linear),
+            First::Spread => first_points(&problem.lattice.axes, bounds, linear),
         }
     }
 }
@@ -93,7 +92,6 @@ impl Search for Synthesis {
                 memo.evaluate(batch)?;
             }
         }
-        // The points that were evaluated first may lie outside the bounds: the best must not.
         let mut best: Option<(f64, Point)> = None;
         let mut last_error = f64::INFINITY;
         for _ in 0..ROUNDS {
@@ -107,19 +105,14 @@ impl Search for Synthesis {
                 best = Some((fitness, point));
             }
         }
-        let start = best.map_or_else(|| memo_best(&memo, &problem.bounds, &centre), |(_, point)| point);
+        let known = || memo.best().map(|(_, point)| point.clone());
+        let start = best.map(|(_, point)| point).or_else(known).unwrap_or(centre);
         // Forecasts that are not to be trusted make room for evaluations.
         let point =
             if last_error > self.bound { descend(&mut memo, &problem.bounds, &start, 1)? } else { start };
         let fitness = memo.evaluate(std::slice::from_ref(&point))?[0];
         Ok(Outcome { best: point, fitness, evaluations: memo.evaluations(), generations: 0 })
     }
-}
-
-/// The best evaluated point within bounds.
-fn memo_best(memo: &Memo, bounds: &Bounds, otherwise: &Point) -> Point {
-    let within = memo.ranking().into_iter().find(|(_, point)| bounds.contains(point));
-    within.map_or_else(|| otherwise.clone(), |(_, point)| point)
 }
 
 /// The point within bounds with the best forecast, where an evaluated point has its fitness for a forecast; `None` where there
@@ -153,36 +146,39 @@ impl Objective for Forecasts<'_, '_> {
     }
 }
 
-/// A lattice at half the rate in each direction, the last levels included; switches keep both.
-fn is_half(axes: &[Axis], point: &Point) -> bool {
-    let is_kept =
-        |(axis, index): (&Axis, &u32)| axis.len() <= 2 || index % 2 == 0 || *index as usize == axis.len() - 1;
-    axes.iter().zip(point).all(is_kept)
+/// Bounds at half the rate in each direction, the last levels included; switches keep both.
+fn is_half(bounds: &Bounds, point: &Point) -> bool {
+    (0..point.len()).all(|axis| {
+        let (low, high) = (bounds.low[axis], bounds.high[axis]);
+        high - low < 2 || (point[axis] - low).is_multiple_of(2) || point[axis] == high
+    })
 }
 
 /// Evenly spread points and the corners of the axes with more than two levels, switches on; and each switch off once. Points
 /// lie at both ends of the axes that are linear.
-fn first_points(axes: &[Axis], whole: &Bounds, linear: &[bool]) -> Vec<Point> {
-    let is_switch = |axis: usize| axes[axis].len() == 2;
-    let wide: Vec<usize> = (0..axes.len()).filter(|axis| axes[*axis].len() > 2 && !linear[*axis]).collect();
-    let mut cube = whole.clone();
+fn first_points(axes: &[Axis], bounds: &Bounds, linear: &[bool]) -> Vec<Point> {
+    let levels = |axis: usize| bounds.high[axis] - bounds.low[axis] + 1;
+    let wide: Vec<usize> = (0..axes.len()).filter(|axis| levels(*axis) > 2 && !linear[*axis]).collect();
+    let mut cube = bounds.clone();
     (0..axes.len()).filter(|axis| !wide.contains(axis)).for_each(|axis| cube.low[axis] = cube.high[axis]);
     let count = 2 * (wide.len() + 1) * (wide.len() + 2);
     let mut points: Vec<Point> = Vec::new();
     for corner in 0..1u32 << wide.len().min(3) {
         let mut point = cube.high.clone();
-        wide.iter().enumerate().filter(|(k, _)| corner >> k & 1 == 0).for_each(|(_, axis)| point[*axis] = 0);
+        let low = wide.iter().enumerate().filter(|(k, _)| corner >> k & 1 == 0);
+        low.for_each(|(_, axis)| point[*axis] = cube.low[*axis]);
         points.push(point);
     }
     points.extend((0..count as u32).map(|k| warped(axes, &cube, &spread(&cube, k))));
     let ends = |point: Point| {
-        let low: Point = (0..axes.len()).map(|axis| if linear[axis] { 0 } else { point[axis] }).collect();
+        let end = |axis: usize| if linear[axis] { bounds.low[axis] } else { point[axis] };
+        let low: Point = (0..axes.len()).map(end).collect();
         [low, point]
     };
     let mut points: Vec<Point> = points.into_iter().flat_map(ends).collect();
-    for axis in (0..axes.len()).filter(|axis| is_switch(*axis)) {
+    for axis in (0..axes.len()).filter(|axis| levels(*axis) == 2) {
         let mut point = points[points.len() / 2].clone();
-        point[axis] = 0;
+        point[axis] = bounds.low[axis];
         points.push(point);
     }
     let mut seen = std::collections::HashSet::new();
@@ -193,12 +189,13 @@ fn first_points(axes: &[Axis], whole: &Bounds, linear: &[bool]) -> Vec<Point> {
 /// Moves the indices of axes whose levels span a wide ratio, so that the levels' logarithms are spread evenly.
 fn warped(axes: &[Axis], bounds: &Bounds, point: &Point) -> Point {
     let warp = |(k, axis): (usize, &Axis)| {
-        let (first, last) = (axis.value(0), axis.value(axis.len() - 1));
-        if first <= 0.0 || last / first < WIDE_RATIO || bounds.low[k] == bounds.high[k] {
+        let (low, high) = (bounds.low[k], bounds.high[k]);
+        let (first, last) = (axis.value(low as usize), axis.value(high as usize));
+        if first <= 0.0 || last / first < WIDE_RATIO || low == high {
             return point[k];
         }
-        let share = f64::from(point[k]) / (axis.len() - 1) as f64;
-        axis.nearest(first * (last / first).powf(share)) as u32
+        let share = f64::from(point[k] - low) / f64::from(high - low);
+        (axis.nearest(first * (last / first).powf(share)) as u32).clamp(low, high)
     };
     axes.iter().enumerate().map(warp).collect()
 }
