@@ -1,0 +1,12 @@
+//! The experiments of Guarnera *et al.* (2018), each as one command, and the report that sets their figures beside ours.
+//!
+//! An [`Experiment`] is run with a [`Setting`] and makes a [`Report`]: data without any layout, which [`page`] makes a file of
+//! HTML of, and [`text`] a summary for terminals.
+
+mod experiment;
+mod experiments;
+mod report;
+
+pub use experiment::{Experiment, Setting, Watch};
+pub use experiments::{by_name, experiments};
+pub use report::{Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table, Verdict};
