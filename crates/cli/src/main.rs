@@ -7,7 +7,6 @@ mod args;
 mod bench;
 mod commands;
 mod output;
-mod plot;
 mod renderers;
 mod report;
 mod transport;
@@ -21,6 +20,7 @@ use clap::Parser;
 use args::{Arguments, Command};
 use lookmatch_export::ExportError;
 use lookmatch_materials::MaterialError;
+use lookmatch_plots::PlotError;
 use lookmatch_remap::RemapError;
 use lookmatch_renderers::InstallationError;
 use lookmatch_textures::TextureError;
@@ -94,6 +94,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         || error.downcast_ref::<MaterialError>().is_some_and(MaterialError::is_usage)
         || error.downcast_ref::<RemapError>().is_some_and(RemapError::is_usage)
         || error.downcast_ref::<ExportError>().is_some_and(ExportError::is_usage)
+        || error.downcast_ref::<PlotError>().is_some_and(PlotError::is_usage)
         || error.downcast_ref::<TextureError>().is_some_and(TextureError::is_usage);
     if usage { 2 } else { 1 }
 }

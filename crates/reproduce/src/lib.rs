@@ -9,4 +9,6 @@ mod report;
 
 pub use experiment::{Experiment, Setting, Watch};
 pub use experiments::{by_name, experiments};
-pub use report::{Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table, Verdict};
+pub use report::{
+    Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table, Verdict,
+};

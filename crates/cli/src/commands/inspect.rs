@@ -1,5 +1,6 @@
 //! `lookmatch inspect`: what is in a probe.
 
+use lookmatch_plots::draw_probe;
 use lookmatch_remap::{Axis, Entry, Flag, Probe, losses};
 use serde_json::json;
 
@@ -17,7 +18,7 @@ pub(crate) fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let losses = losses(&probe)?;
     if let Some(path) = &args.plot {
         check_output(path)?;
-        crate::plot::draw(&probe, path)?;
+        draw_probe(&probe, path)?;
     }
     if args.json.json {
         let mut summary = summary(&probe);

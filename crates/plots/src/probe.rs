@@ -1,32 +1,22 @@
 //! A probe as a picture: each target parameter over the source parameters, as in Figure 11 of Guarnera *et al.* (2018), and a map of
 //! what is left between source and target.
 
-use std::path::Path;
-use std::sync::Once;
-
-use anyhow::Context;
-use lookmatch_imaging::write_atomically;
 use lookmatch_materials::{Material, Scale};
 use lookmatch_remap::{Axis, Entry, Flag, Probe};
-use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters::style::{FontStyle, register_font};
+use std::path::Path;
 
-use crate::Usage;
+use crate::PlotError;
+use crate::sheet::{self, Area, Drawing, Drawn, short};
 
 /// Size of a panel, of the colour bar in it, and of the title above all, in pixels.
 const PANEL: (u32, u32) = (430, 350);
 const BAR: u32 = 100;
 const TITLE: u32 = 64;
-/// Pixels of a PNG for one of the layout.
-const DENSITY: u32 = 2;
 /// Samples along each axis of a smooth function.
 const FINE: usize = 72;
 /// Slices of a third source parameter.
 const SLICES: usize = 3;
-
-type Area<'a, B> = DrawingArea<B, Shift>;
-type Drawn = Result<(), String>;
 
 /// An axis of a panel: where its levels lie, and what they are called.
 #[derive(Clone)]
@@ -61,59 +51,33 @@ impl Panel {
 }
 
 /// Draws a probe into a .png or .svg file.
-pub(crate) fn draw(probe: &Probe, path: &Path) -> anyhow::Result<()> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    if !matches!(extension.as_str(), "png" | "svg") {
-        return Err(Usage(format!("cannot draw '{}': a plot ends in .png or .svg", path.display())).into());
-    }
+///
+/// # Errors
+/// Another ending; a probe of a single material; a file that cannot be written.
+pub fn draw_probe(probe: &Probe, path: &Path) -> Result<(), PlotError> {
     if probe.source_axes.is_empty() {
-        return Err(Usage("cannot draw the probe: its source is a single material".into()).into());
+        return Err(PlotError::NoAxis);
     }
-    register();
     let rows = rows(probe)?;
     let columns = rows.iter().map(Vec::len).max().unwrap_or(1) as u32;
     let size = (columns * PANEL.0, TITLE + rows.len() as u32 * PANEL.1);
-    let failed = |why: String| anyhow::anyhow!("cannot draw '{}': {why}", path.display());
-    let bytes = if extension == "svg" {
-        let mut text = String::new();
-        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        figure(probe, &root, &rows, 1).map_err(failed)?;
-        drop(root);
-        text.into_bytes()
-    } else {
-        let size = (size.0 * DENSITY, size.1 * DENSITY);
-        let mut pixels = vec![255; (size.0 * size.1 * 3) as usize];
-        let root = BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area();
-        figure(probe, &root, &rows, DENSITY).map_err(failed)?;
-        drop(root);
-        png(&pixels, size)?
-    };
-    write_atomically(path, |out| out.write_all(&bytes))
-        .with_context(|| format!("cannot write '{}'", path.display()))
+    sheet::write(path, size, &Probed { probe, rows })
 }
 
-/// The font that comes with the program: systems differ in theirs, and some have none.
-fn register() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        // A font that cannot be read shows as missing text, and cannot happen to one that is built in.
-        let _ = register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular());
-    });
+/// A probe with its panels.
+struct Probed<'a> {
+    probe: &'a Probe,
+    rows: Vec<Vec<Panel>>,
 }
 
-fn png(pixels: &[u8], (width, height): (u32, u32)) -> anyhow::Result<Vec<u8>> {
-    let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(pixels)?;
-    writer.finish()?;
-    Ok(file)
+impl Drawing for Probed<'_> {
+    fn draw<B: DrawingBackend>(&self, root: &Area<B>, scale: u32) -> Drawn {
+        figure(self.probe, root, &self.rows, scale)
+    }
 }
 
 /// The panels, by rows: the table and the fit, or slices of the table.
-fn rows(probe: &Probe) -> anyhow::Result<Vec<Vec<Panel>>> {
+fn rows(probe: &Probe) -> Result<Vec<Vec<Panel>>, PlotError> {
     let axes = &probe.source_axes;
     // A plane of the two last axes; the others are cut.
     let shown = axes.len().saturating_sub(2)..axes.len();
@@ -155,12 +119,12 @@ fn rows(probe: &Probe) -> anyhow::Result<Vec<Vec<Panel>>> {
 }
 
 /// Rows at some levels of the axis before the last two, the middle levels of all axes before it.
-fn slices(probe: &Probe, scales: &[Ruler]) -> anyhow::Result<Vec<Vec<Panel>>> {
+fn slices(probe: &Probe, scales: &[Ruler]) -> Result<Vec<Vec<Panel>>, PlotError> {
     let cut = probe.source_axes.len() - 2;
     let count = probe.source_axes[cut - 1].len();
     let mut levels: Vec<usize> = (0..SLICES).map(|k| k * (count - 1) / (SLICES - 1)).collect();
     levels.dedup();
-    let row = |level: &usize| -> anyhow::Result<Vec<Panel>> {
+    let row = |level: &usize| -> Result<Vec<Panel>, PlotError> {
         let mut at: Vec<f64> = probe.source_axes[..cut].iter().map(|a| a.value(a.len() / 2)).collect();
         at[cut - 1] = probe.source_axes[cut - 1].value(*level);
         let places: Vec<usize> =
@@ -184,7 +148,7 @@ fn all(probe: &Probe) -> Vec<usize> {
 }
 
 /// The range of a target parameter's values, and whether its scale is logarithmic.
-fn target(probe: &Probe, axis: &Axis) -> anyhow::Result<([f64; 2], bool)> {
+fn target(probe: &Probe, axis: &Axis) -> Result<([f64; 2], bool), PlotError> {
     let k = probe.target_axes.iter().position(|a| a.name == axis.name).unwrap_or(0);
     let is_log = scale(&probe.to, axis)?.is_log;
     Ok((range(probe.found().map(|e| e.target[k])), is_log))
@@ -235,7 +199,7 @@ fn label(material: &Material, name: &str) -> String {
     format!("{} {name} [{unit}]", model.name)
 }
 
-fn scale(material: &Material, axis: &Axis) -> anyhow::Result<Ruler> {
+fn scale(material: &Material, axis: &Axis) -> Result<Ruler, PlotError> {
     let range = material.model().parameter(&axis.name)?.range();
     let is_log = axis.value(0) > 0.0 && range.is_some_and(|r| r.scale == Scale::Logarithmic);
     let mut scale = Ruler { label: label(material, &axis.name), is_log, centres: Vec::new() };
@@ -284,13 +248,6 @@ fn curve(probe: &Probe, scale: &Ruler, k: usize) -> Vec<(f64, f64)> {
         }
         None => probe.found().map(|e| (scale.position(e.source[0]), e.target[k])).collect(),
     }
-}
-
-/// Three digits, without zeros at the end.
-fn short(value: f64) -> String {
-    let digits = (2 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 6) as usize;
-    let text = format!("{value:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
 fn figure<B: DrawingBackend>(probe: &Probe, root: &Area<B>, rows: &[Vec<Panel>], scale: u32) -> Drawn {
