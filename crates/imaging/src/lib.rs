@@ -22,6 +22,8 @@ pub use false_colour::{error_map, error_scale};
 pub use file::{MAX_PIXELS, decode, encode, read, write};
 pub use image::Image;
 pub use lab::{lab_planes, lab_planes_of, squared_distance, weighted_squared_distance};
+pub use metrics::Plane;
+pub use metrics::delta_e::{delta_e76_map, delta_e2000, delta_e2000_map};
 pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
 pub use metrics::jod::{VIEWING, jod};
 pub use metrics::mask::{Mask, disc_weight};

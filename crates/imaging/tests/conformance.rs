@@ -3,7 +3,7 @@
 //! They lie beside the repository, not in it. Where they are missing, the tests say so and pass.
 
 use lookmatch_imaging::{
-    Fitness, Image, Mask, ProbeImages, ProbePixels, Reduce, Space, delta_e76, disc_weight,
+    Fitness, Image, Mask, ProbeImages, ProbePixels, Reduce, Space, delta_e76, delta_e2000, disc_weight,
     lab_from_linear_srgb, nrmsd, nrmsd_pixels,
 };
 use serde_json::Value;
@@ -70,6 +70,8 @@ fn delta_e() {
     for vector in vectors("delta_e") {
         let found = delta_e76(triple(&vector["lab1"]), triple(&vector["lab2"]));
         assert_close(&[found], &[number(&vector["de76"])], EXACT, "ΔE76");
+        let found = delta_e2000(triple(&vector["lab1"]), triple(&vector["lab2"]));
+        assert_close(&[found], &[number(&vector["de2000"])], EXACT, "CIEDE2000");
     }
 }
 
