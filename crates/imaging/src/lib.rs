@@ -25,8 +25,11 @@ pub use lab::{lab_planes, lab_planes_of, squared_distance, weighted_squared_dist
 pub use metrics::Plane;
 pub use metrics::delta_e::{delta_e76_map, delta_e2000, delta_e2000_map};
 pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
+pub use metrics::gsm::{MEAN, gsm_map, gsm_of_greys};
 pub use metrics::jod::{VIEWING, jod};
+pub use metrics::luma::luma_255;
 pub use metrics::mask::{Mask, disc_weight};
 pub use metrics::nrmsd::{nrmsd, nrmsd_of_noise, nrmsd_pixels};
+pub use metrics::ssim::ssim_map;
 pub use noisy::{Estimate, Neighbourhoods, NoisyLab};
 pub use product::{Columns, inner_product};

@@ -1,11 +1,15 @@
 //! Numbers for how far apart two renderings look. Exact, in `f64`; one metric a file.
 
 pub mod delta_e;
+mod filter;
 pub mod fitness;
+pub mod gsm;
 pub mod jod;
+pub mod luma;
 pub mod mask;
 pub mod nrmsd;
 mod plane;
+pub mod ssim;
 
 use crate::{Image, ImageError};
 use mask::Mask;
