@@ -3,6 +3,7 @@
 pub mod delta_e;
 mod filter;
 pub mod fitness;
+pub mod flip;
 pub mod gsm;
 pub mod jod;
 pub mod luma;
