@@ -4,7 +4,7 @@
 
 use lookmatch_imaging::{
     Fitness, Image, MEAN, Mask, ProbeImages, ProbePixels, Reduce, Space, delta_e76, delta_e2000, disc_weight,
-    gsm_of_greys, lab_from_linear_srgb, luma_255, nrmsd, nrmsd_pixels,
+    distance_correlation, gsm_of_greys, lab_from_linear_srgb, luma_255, nrmsd, nrmsd_pixels,
 };
 use serde_json::Value;
 use std::io::Write;
@@ -109,6 +109,15 @@ fn nrmsd_of_channels() {
 fn luma() {
     for vector in vectors("luma_255") {
         assert_close(&[luma_255(triple(&vector["rgb"]))], &[number(&vector["y"])], EXACT, "luma_255");
+    }
+}
+
+#[test]
+fn correlation_of_distances() {
+    for vector in vectors("distance_correlation") {
+        let list = |name: &str| vector[name].as_array().unwrap().iter().map(number).collect::<Vec<f64>>();
+        let found = distance_correlation(&list("x"), &list("y")).unwrap();
+        assert_close(&[found], &[number(&vector["dcor"])], EXACT, "distance correlation");
     }
 }
 

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::filter::{separable, with_edges};
 use super::{Plane, check_pair};
+use crate::lab::cube_root;
 use crate::{Image, ImageError};
 
 /// Pixels per degree of the authors' default, which published figures have: a 4K monitor of 0.7 m width seen from 0.7 m.
@@ -33,8 +34,6 @@ const COLOUR_KNEE: f32 = 0.4;
 const KNEE_VALUE: f32 = 0.95;
 /// Width of the edges and points that are looked for, in degrees.
 const FEATURE_WIDTH: f32 = 0.082;
-/// Differences of edges and points are raised to this power.
-const FEATURE_EXPONENT: f32 = 0.5;
 /// What a picture's brightest pixels become at the lowest exposure, and its median at the highest.
 const EXPOSED: f32 = 0.85;
 /// Brighter light is white at any exposure; its square still fits an `f32`.
@@ -162,8 +161,9 @@ fn hunt_lab([y, cx, cz]: [f32; 3]) -> [f32; 3] {
 
 fn hunt_lab_of_rgb(rgb: [f32; 3]) -> [f32; 3] {
     const DELTA: f32 = 6.0 / 29.0;
+    let root = |t: f32| cube_root(t).iter().sum();
     let compress =
-        |t: f32| if t > DELTA * DELTA * DELTA { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
+        |t: f32| if t > DELTA * DELTA * DELTA { root(t) } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
     let [x, y, z] = relative(rgb).map(compress);
     let lightness = 116.0 * y - 16.0;
     [lightness, 0.01 * lightness * 500.0 * (x - y), 0.01 * lightness * 200.0 * (y - z)]
@@ -193,20 +193,27 @@ impl Eye {
     }
 
     fn differences(&self, source: &Opponent, target: &Opponent, width: usize) -> Vec<f32> {
-        let [a, b] = [source, target].map(|planes| self.blurred(planes, width));
-        let [fa, fb] = [source, target].map(|planes| self.features(&planes[0], width));
+        let seen = |planes: &Opponent| (self.blurred(planes, width), self.features(&planes[0], width));
+        let ((a, fa), (b, fb)) = rayon::join(|| seen(source), || seen(target));
         let feature = |(a, b): ([f32; 2], [f32; 2])| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
         let value = |i: usize| {
             let pixel = |planes: &Opponent| hunt_lab(std::array::from_fn(|c| planes[c][i]));
             let colour = self.colour_difference(pixel(&a), pixel(&b));
-            let feature = (feature((fa[i], fb[i])) / 2.0_f32.sqrt()).powf(FEATURE_EXPONENT);
+            if colour == 0.0 {
+                return 0.0;
+            }
+            // The exponent of features is 1/2.
+            let feature = (feature((fa[i], fb[i])) / 2.0_f32.sqrt()).sqrt();
             colour.powf(1.0 - feature)
         };
-        (0..source[0].len()).map(value).collect()
+        (0..source[0].len()).into_par_iter().with_min_len(4096).map(value).collect()
     }
 
     /// 0 to 1.
     fn colour_difference(&self, a: [f32; 3], b: [f32; 3]) -> f32 {
+        if a == b {
+            return 0.0;
+        }
         let (difference, knee) = (hyab(a, b).powf(COLOUR_EXPONENT), COLOUR_KNEE * self.largest);
         if difference < knee {
             KNEE_VALUE * difference / knee

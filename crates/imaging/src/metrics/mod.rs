@@ -1,6 +1,7 @@
 //! Numbers for how far apart two renderings look. Exact, in `f64`; one metric a file.
 
 pub mod delta_e;
+pub mod distance_correlation;
 mod filter;
 pub mod fitness;
 pub mod flip;
@@ -10,7 +11,9 @@ pub mod luma;
 pub mod mask;
 pub mod nrmsd;
 mod plane;
+pub mod registry;
 pub mod ssim;
+pub mod verdict;
 
 use crate::{Image, ImageError};
 use mask::Mask;
