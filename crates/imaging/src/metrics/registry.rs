@@ -25,7 +25,15 @@ enum Statistic {
     Max,
 }
 
+impl PartialEq for Metric {
+    /// Names are unique.
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
 /// How a metric comes to its numbers, and what a mask does to it.
+#[derive(Debug)]
 enum Measure {
     /// By way of a value at every pixel. What is told of them is weighted with the mask; a neighbourhood sees beyond it.
     Map(fn(&Image, &Image) -> Result<Plane, ImageError>, &'static [Statistic]),
@@ -34,7 +42,7 @@ enum Measure {
 }
 
 /// A metric of two pictures: of a source, and of a target that should look like it.
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Metric {
     /// As in JSON: lower case letters, digits and `_`.
     pub name: &'static str,
@@ -46,9 +54,6 @@ pub struct Metric {
     pub better: Better,
     /// How the pictures are looked at.
     pub viewing: &'static str,
-    /// True for metrics that take more than a few hundredths of a second for 300 × 300 pixels.
-    #[serde(skip)]
-    pub is_slow: bool,
     #[serde(skip)]
     measure: Measure,
 }
@@ -56,6 +61,9 @@ pub struct Metric {
 /// A number of a metric.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reading {
+    /// Name of its metric in [`METRICS`].
+    #[serde(skip)]
+    pub metric: &'static str,
     /// The metric's name; where it has several numbers, with `_mean`, `_p95` (what 95 % of the pixels do not exceed) or `_max`.
     pub name: String,
     /// As in tables.
@@ -72,13 +80,13 @@ const MEAN: &[Statistic] = &[Statistic::Mean];
 /// Every metric of two pictures but NRMSD, which has a number for each channel.
 #[rustfmt::skip]
 pub const METRICS: &[Metric] = &[
-    Metric { name: "delta_e_76", title: "ΔE*76", unit: "CIELAB distance, 0 where equal", better: Better::Lower, viewing: delta_e::VIEWING, is_slow: false, measure: Measure::Map(delta_e::delta_e76_map, SPREAD) },
-    Metric { name: "delta_e_2000", title: "ΔE2000", unit: "CIEDE2000, 0 where equal", better: Better::Lower, viewing: delta_e::VIEWING, is_slow: false, measure: Measure::Map(delta_e::delta_e2000_map, SPREAD) },
-    Metric { name: "gsm", title: "GSM", unit: "similarity, 1 where equal", better: Better::Higher, viewing: gsm::VIEWING, is_slow: false, measure: Measure::Map(gsm::gsm_map, MEAN) },
-    Metric { name: "ssim", title: "SSIM", unit: "similarity, 1 where equal", better: Better::Higher, viewing: ssim::VIEWING, is_slow: false, measure: Measure::Map(ssim::ssim_map, MEAN) },
-    Metric { name: "flip", title: "FLIP", unit: "difference 0 to 1, 0 where equal", better: Better::Lower, viewing: flip::VIEWING, is_slow: false, measure: Measure::Map(|a, b| flip::flip_map(a, b, flip::PIXELS_PER_DEGREE), MEAN) },
-    Metric { name: "hdr_flip", title: "HDR-FLIP", unit: "difference 0 to 1, 0 where equal", better: Better::Lower, viewing: flip::HDR_VIEWING, is_slow: true, measure: Measure::Map(|a, b| flip::hdr_flip_map(a, b, flip::PIXELS_PER_DEGREE), MEAN) },
-    Metric { name: "jod", title: "ColorVideoVDP", unit: "JOD, 10 where equal", better: Better::Higher, viewing: jod::VIEWING, is_slow: true, measure: Measure::Whole(jod::jod) },
+    Metric { name: "delta_e_76", title: "ΔE*76", unit: "CIELAB distance, 0 where equal", better: Better::Lower, viewing: delta_e::VIEWING, measure: Measure::Map(delta_e::delta_e76_map, SPREAD) },
+    Metric { name: "delta_e_2000", title: "ΔE2000", unit: "CIEDE2000, 0 where equal", better: Better::Lower, viewing: delta_e::VIEWING, measure: Measure::Map(delta_e::delta_e2000_map, SPREAD) },
+    Metric { name: "gsm", title: "GSM", unit: "similarity, 1 where equal", better: Better::Higher, viewing: gsm::VIEWING, measure: Measure::Map(gsm::gsm_map, MEAN) },
+    Metric { name: "ssim", title: "SSIM", unit: "similarity, 1 where equal", better: Better::Higher, viewing: ssim::VIEWING, measure: Measure::Map(ssim::ssim_map, MEAN) },
+    Metric { name: "flip", title: "FLIP", unit: "difference 0 to 1, 0 where equal", better: Better::Lower, viewing: flip::VIEWING, measure: Measure::Map(|a, b| flip::flip_map(a, b, flip::PIXELS_PER_DEGREE), MEAN) },
+    Metric { name: "hdr_flip", title: "HDR-FLIP", unit: "difference 0 to 1, 0 where equal", better: Better::Lower, viewing: flip::HDR_VIEWING, measure: Measure::Map(|a, b| flip::hdr_flip_map(a, b, flip::PIXELS_PER_DEGREE), MEAN) },
+    Metric { name: "jod", title: "ColorVideoVDP", unit: "JOD, 10 where equal", better: Better::Higher, viewing: jod::VIEWING, measure: Measure::Whole(jod::jod) },
 ];
 
 impl Metric {
@@ -99,7 +107,7 @@ impl Metric {
                     let of = |mask| map.as_ref().map(|map| statistic.of(map, mask));
                     let masked = mask.and_then(|mask| of(Some(mask))).map(available).transpose()?.flatten();
                     let (name, title) = self.named(*statistic, statistics.len());
-                    Ok(Reading { name, title, whole: of(None).transpose()?, masked })
+                    Ok(Reading { metric: self.name, name, title, whole: of(None).transpose()?, masked })
                 };
                 statistics.iter().map(told).collect()
             }
@@ -107,7 +115,13 @@ impl Metric {
                 let whole = available(compute(source, target))?;
                 let of = |mask| available(compute(source, &faded(source, target, mask)?));
                 let masked = mask.map(of).transpose()?.flatten();
-                Ok(vec![Reading { name: self.name.into(), title: self.title.into(), whole, masked }])
+                Ok(vec![Reading {
+                    metric: self.name,
+                    name: self.name.into(),
+                    title: self.title.into(),
+                    whole,
+                    masked,
+                }])
             }
         }
     }
