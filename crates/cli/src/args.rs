@@ -324,7 +324,7 @@ pub(crate) struct CompareArgs {
     pub(crate) pictures: Vec<PathBuf>,
     /// What counts of the pictures: disc (the largest in their middle), CX,CY,R (a disc, in pixels), or a picture (.exr, .hdr; white counts
     /// in full). Discs fade outwards, as the paper's mask does
-    #[arg(long, requires = "pictures")]
+    #[arg(long)]
     pub(crate) mask: Option<String>,
     /// The material to look like
     #[arg(long, required_unless_present = "pictures")]

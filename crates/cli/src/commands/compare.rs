@@ -27,6 +27,10 @@ pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
 }
 
 fn materials(args: &CompareArgs, texts: [&String; 2], output: &Path) -> anyhow::Result<()> {
+    if let Some(mask) = &args.mask {
+        let wrong = format!("--mask {mask} is for two pictures; scenes have masks of their own");
+        return Err(Usage(wrong).into());
+    }
     let (mut scene, illumination) = lit_scene(&args.scene, &args.light)?;
     let named: Vec<String> = texts.into_iter().filter_map(|text| renderer_of(text)).collect();
     if let Some(name) = named.first() {

@@ -16,7 +16,7 @@ use crate::output::{print, print_json, score, table};
 
 pub(crate) fn run(args: &CompareArgs, [source, target]: [&PathBuf; 2]) -> anyhow::Result<()> {
     let (a, b) = (read(source)?, read(target)?);
-    let mask = args.mask.as_deref().map(|text| mask(text, &a)).transpose()?;
+    let mask = args.mask.as_deref().map(|text| checked_mask(text, &a)).transpose()?;
     let both = || format!("'{}' and '{}'", source.display(), target.display());
     a.check_same_size(&b).with_context(both)?;
     let whole = defined(nrmsd(&a, &b, None))?;
@@ -69,6 +69,15 @@ fn defined(nrmsd: Result<[f64; 3], ImageError>) -> anyhow::Result<Option<[f64; 3
         Err(ImageError::NoRange { .. }) => Ok(None),
         nrmsd => Ok(Some(nrmsd?)),
     }
+}
+
+/// A mask that leaves something.
+fn checked_mask(text: &str, of: &Image) -> anyhow::Result<Mask> {
+    let mask = mask(text, of)?;
+    if mask.weights().iter().all(|weight| *weight <= 0.0) {
+        return Err(ImageError::EmptyMask).with_context(|| format!("--mask {text}"));
+    }
+    Ok(mask)
 }
 
 /// `disc`, `CX,CY,R` or a picture.
