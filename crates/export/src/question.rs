@@ -1,7 +1,7 @@
 //! Asking `apply`, once for each point.
 
 use std::collections::HashMap;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use lookmatch_materials::{Material, Value};
 use lookmatch_remap::{Probe, RemapError, apply, apply_smoothly};
@@ -68,11 +68,11 @@ impl<'a> Question<'a> {
 
     pub(crate) fn ask(&self, point: &Point) -> Result<Answer, ExportError> {
         let key: Vec<u64> = point.iter().flatten().map(|v| v.to_bits()).collect();
-        if let Some(answer) = self.known.lock().expect("no thread panicked").get(&key) {
+        if let Some(answer) = self.known.lock().unwrap_or_else(PoisonError::into_inner).get(&key) {
             return Ok(answer.clone());
         }
         let answer = self.apply(point)?;
-        self.known.lock().expect("no thread panicked").insert(key, answer.clone());
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(key, answer.clone());
         Ok(answer)
     }
 
