@@ -93,20 +93,10 @@ impl<'a> Question<'a> {
         }
         let apply = if self.is_smooth { apply_smoothly } else { apply };
         match apply(self.probe, &source, false) {
-            Ok(applied) => Ok(Some(applied.target.values().iter().map(numbers).collect())),
+            Ok(applied) => Ok(Some(applied.target.values().iter().map(Value::numbers).collect())),
             Err(RemapError::Option(_)) if self.probe.entries.iter().any(|e| e.failed.is_some()) => Ok(None),
             Err(error) => Err(error.into()),
         }
-    }
-}
-
-/// The numbers of a value; none for a choice or a file.
-pub(crate) fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Number(v) => vec![*v],
-        Value::Colour(c) => c.to_vec(),
-        Value::List(v) => v.to_vec(),
-        Value::Choice(_) | Value::File(_) => Vec::new(),
     }
 }
 

@@ -63,16 +63,6 @@ pub(crate) struct Baked {
     table: Option<Lut>,
 }
 
-/// The numbers of a value; none for a choice or a file.
-pub(crate) fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Number(v) => vec![*v],
-        Value::Colour(c) => c.to_vec(),
-        Value::List(v) => v.to_vec(),
-        Value::Choice(_) | Value::File(_) => Vec::new(),
-    }
-}
-
 /// What is asked: the probe with the parameters that textures leave alone.
 pub(crate) struct Question<'a> {
     probe: &'a Probe,
@@ -187,7 +177,7 @@ impl Baked {
             let parameters = model.resolve(&axis.name).map_err(RemapError::from)?;
             let points = |channel: usize| -> Vec<f64> {
                 let value = |t: &Option<Vec<Value>>| {
-                    t.as_ref().and_then(|t| numbers(&t[parameters[0]]).get(channel).copied())
+                    t.as_ref().and_then(|t| t[parameters[0]].numbers().get(channel).copied())
                 };
                 targets.iter().map(|t| value(t).unwrap_or(f64::NAN)).collect()
             };
@@ -420,10 +410,10 @@ fn keeps_channels(question: &Question, index: usize, middle: &[f64]) -> Result<b
         source.set_value(place, colour).map_err(RemapError::from)?;
     }
     let Some(mixed) = question.target(&source)? else { return Ok(false) };
-    let mixed = numbers(&mixed[index]);
+    let mixed = mixed[index].numbers();
     for (channel, share) in shares.into_iter().enumerate() {
         let Some(grey) = question.target(&question.source(&at(share))?)? else { return Ok(false) };
-        let (Some(mixed), Some(grey)) = (mixed.get(channel), numbers(&grey[index]).first().copied()) else {
+        let (Some(mixed), Some(grey)) = (mixed.get(channel), grey[index].numbers().first().copied()) else {
             return Ok(false);
         };
         if (mixed - grey).abs() > crate::TOLERANCE * grey.abs().max(1e-2) {
