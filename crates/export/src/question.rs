@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
+use itertools::Itertools;
 use lookmatch_materials::{Material, Value};
 use lookmatch_remap::{Probe, RemapError, apply, apply_smoothly};
 use rayon::prelude::*;
@@ -102,9 +103,5 @@ impl<'a> Question<'a> {
 
 /// The points of a grid, the first axis slowest.
 pub(crate) fn grid(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    levels.iter().fold(vec![Vec::new()], |points, levels| {
-        let longer =
-            |point: Vec<f64>| levels.iter().map(move |l| [&point[..], &[*l]].concat()).collect::<Vec<_>>();
-        points.into_iter().flat_map(longer).collect()
-    })
+    levels.iter().map(|levels| levels.iter().copied()).multi_cartesian_product().collect()
 }

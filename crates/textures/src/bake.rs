@@ -6,6 +6,7 @@
 
 use std::sync::atomic::AtomicBool;
 
+use itertools::Itertools;
 use lookmatch_materials::{Kind, Material, Value};
 use lookmatch_remap::{Axis, Probe, RemapError, apply};
 use rayon::prelude::*;
@@ -425,9 +426,5 @@ fn keeps_channels(question: &Question, index: usize, middle: &[f64]) -> Result<b
 
 /// The points of a grid, the first axis slowest.
 pub(crate) fn points(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    levels.iter().fold(vec![Vec::new()], |points, levels| {
-        let longer =
-            |point: Vec<f64>| levels.iter().map(move |l| [&point[..], &[*l]].concat()).collect::<Vec<_>>();
-        points.into_iter().flat_map(longer).collect()
-    })
+    levels.iter().map(|levels| levels.iter().copied()).multi_cartesian_product().collect()
 }
