@@ -58,6 +58,7 @@ fn mistakes_of_the_picture_are_named() {
     is_named("srgb", "lambert", "sRGB-encoded");
     is_named("clipped", "lambert", "clipped at 1");
     is_named("clipped", "linearity", "bright light of a lamp is lost");
+    is_named("squared-tint", "linearity", "specular says that it is linear in tint, and is not");
     is_named("power", "lambert", "the power 0.8");
     is_named("bgr", "lambert", "BGR");
 }

@@ -12,10 +12,10 @@ use serde_json::json;
 
 use crate::Usage;
 use crate::args::CompareArgs;
-use crate::commands::{compare_pictures, create_folder, lit_scene, material};
+use crate::commands::{compare_pictures, create_folder, interruption, lit_scene, material};
 use crate::judgement::Judgement;
 use crate::output::{print, print_json, score, spinner, table};
-use crate::renderers::{Renderers, interruption, plain_scene, renderer_of};
+use crate::renderers::{Renderers, plain_scene, renderer_of};
 use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {

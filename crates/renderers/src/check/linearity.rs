@@ -54,8 +54,12 @@ fn declared(session: &mut Session, finding: &mut Finding) -> Result<(), Renderer
             };
             let (low, high, middle) = (shown(low)?, shown(high)?, shown((low + high) / 2.0)?);
             let halfway = low.zipped(&high, |a, b| (a + b) / 2.0);
-            let name = format!("{} halfway in {}: ratio", own_name(model), parameter.name);
-            if !finding.measure(name, quotient(&middle, &halfway), Limit::between(0.97, 1.03)) {
+            let name = |what| format!("{} halfway in {}: {what}", own_name(model), parameter.name);
+            let (ratio, off) = (quotient(&middle, &halfway), off_halfway(&low, &middle, &high));
+            // The median is that of the body, the other is that of the highlight where one changes.
+            let is_body_linear = finding.measure(name("ratio"), ratio, Limit::between(0.97, 1.03));
+            let is_change_linear = finding.measure(name("off"), off, Limit::between(-0.03, 0.03));
+            if !is_body_linear || !is_change_linear {
                 finding.remark(format!(
                     "{} says that it is linear in {}, and is not",
                     own_name(model),
@@ -89,6 +93,18 @@ fn picture(session: &Session, name: &str, scene: &Scene, worn: &Worn) -> Result<
 /// The median of bright values over those of another picture.
 fn quotient(more: &Image, less: &Image) -> f64 {
     compare::median_ratio(more, less, &vec![true; less.pixels().len()])
+}
+
+/// How far a picture is from halfway between two others, as a share of their change: 0 for linear parameters, -0.25 for a square.
+/// Noise has no part in it, because it does not depend on the sign of the change.
+fn off_halfway(low: &Image, middle: &Image, high: &Image) -> f64 {
+    let pixels = low.pixels().as_flattened().iter().zip(middle.pixels().as_flattened());
+    let triples =
+        pixels.zip(high.pixels().as_flattened()).map(|((l, m), h)| [l, m, h].map(|v| f64::from(*v)));
+    let (off, change) = triples.fold((0.0, 0.0), |(off, change), [low, middle, high]| {
+        (off + (middle - (low + high) / 2.0) * (high - low), change + (high - low).powi(2))
+    });
+    off / change
 }
 
 fn ratio(what: &str, strength: f64, more: &Image, less: &Image, finding: &mut Finding) {

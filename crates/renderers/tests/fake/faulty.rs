@@ -100,7 +100,7 @@ impl Worker {
         let colour = |name: &str, role: &str| json!({ "name": name, "role": role, "kind": "colour", "default": [0.5, 0.5, 0.5], "valid": range });
         let model = |parameter: Value| {
             json!({ "name": parameter["role"].as_str().unwrap().split('-').next(), "parameters": [parameter],
-                "surveyed": [parameter["name"]], "searched": [parameter["name"]] })
+                "surveyed": [parameter["name"]], "searched": [parameter["name"]], "linear": [parameter["name"]] })
         };
         let mut blurred = Vec::new();
         if self.has("declared-blur") {
@@ -127,7 +127,10 @@ impl Worker {
         if self.has("dark-nan") && matches!(finish, Finish::Mirror([0.0, ..])) {
             return Ok(Finish::Mirror([f64::NAN; 3]));
         }
-        Ok(finish)
+        Ok(match finish {
+            Finish::Mirror(tint) if self.has("squared-tint") => Finish::Mirror(tint.map(|v| v * v)),
+            finish => finish,
+        })
     }
 
     fn scene(&mut self, request: &Value, data: &[u8]) {
