@@ -5,10 +5,17 @@
 
 mod experiment;
 mod experiments;
+mod number;
+mod page;
 mod report;
+mod text;
+mod write;
 
 pub use experiment::{Experiment, Setting, Watch};
 pub use experiments::{by_name, experiments};
+pub use page::page;
 pub use report::{
     Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table, Verdict,
 };
+pub use text::text;
+pub use write::{keep, kept, pictures, write};

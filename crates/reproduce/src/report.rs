@@ -147,9 +147,9 @@ pub struct Picture {
     pub title: String,
     /// The material, as it would be typed.
     pub material: String,
-    /// Name of a PNG file beside the report.
+    /// A PNG file, as its path from the report's folder: `pictures/NAME.png`.
     pub file: String,
-    /// Its error map in false colour, beside the report as well; none of the source.
+    /// Its error map in false colour, a PNG file there as well; none of the source.
     pub error_file: Option<String>,
     /// Mean NRMSD of the channels beside the source.
     pub nrmsd: Option<f64>,
@@ -171,6 +171,17 @@ pub enum Verdict {
     NoticeablyDifferent,
 }
 
+impl Verdict {
+    /// As people read it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Indistinguishable => "indistinguishable",
+            Self::SlightlyDifferent => "slightly different",
+            Self::NoticeablyDifferent => "noticeably different",
+        }
+    }
+}
+
 /// A drawn figure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
@@ -178,6 +189,6 @@ pub struct Figure {
     pub title: String,
     /// Below it; may be empty.
     pub about: String,
-    /// Name of an SVG or PNG file beside the report.
+    /// An SVG or PNG file, as its path from the report's folder: `pictures/NAME.svg`.
     pub file: String,
 }

@@ -1,0 +1,118 @@
+//! Numbers and times as people read them.
+
+use crate::Report;
+use crate::report::{Bar, Finding};
+
+/// Most digits after the point where two numbers have to be told apart.
+const MOST_DIGITS: usize = 8;
+
+/// A number with about four digits, those of NRMSD as the paper's tables have them; whole numbers are whole.
+pub(crate) fn number(value: f64) -> String {
+    with_digits(value, digits(value))
+}
+
+/// Two numbers, with as many digits as it takes to see that they differ.
+pub(crate) fn apart(a: f64, b: f64) -> [String; 2] {
+    let enough = digits(a).max(digits(b));
+    let mut pairs =
+        (enough..=MOST_DIGITS).map(|digits| (digits, [a, b].map(|value| format!("{value:.digits$}"))));
+    match pairs.find(|(_, [a, b])| a != b) {
+        _ if a == b || !a.is_finite() => [a, b].map(number),
+        Some((digits, _)) if digits == enough => [a, b].map(number),
+        Some((_, pair)) => pair,
+        None => [a, b].map(|value| format!("{value:e}")),
+    }
+}
+
+/// What was measured, and what it should be: "0.0123", "at most 0.0107".
+pub(crate) fn measured(finding: &Finding) -> [String; 2] {
+    let (words, bar) = match finding.bar {
+        Bar::AtMost(most) => ("at most", most),
+        Bar::AtLeast(least) => ("at least", least),
+    };
+    let [value, bar] = apart(finding.value, bar);
+    [value, format!("{words} {bar}")]
+}
+
+/// Ours beside the paper's, with their ratio: "0.0101 / 0.0107 (0.94×)".
+pub(crate) fn beside(ours: f64, paper: f64) -> String {
+    let [left, right] = apart(ours, paper);
+    let ratio = ours / paper;
+    if !ratio.is_finite() {
+        return format!("{left} / {right}");
+    }
+    let short = format!("{ratio:.2}");
+    // A ratio that is just above one must not look like one.
+    let ratio = if short == "1.00" && ratio != 1.0 { apart(ratio, 1.0)[0].clone() } else { short };
+    format!("{left} / {right} ({ratio}×)")
+}
+
+/// "8.2 s", "3 min 20 s", "1 h 12 min".
+pub(crate) fn duration(seconds: f64) -> String {
+    let whole = seconds.max(0.0).round() as u64;
+    match whole {
+        0..10 => format!("{seconds:.1} s"),
+        10..60 => format!("{whole} s"),
+        60..3600 => format!("{} min {} s", whole / 60, whole % 60),
+        _ => format!("{} h {} min", whole / 3600, whole % 3600 / 60),
+    }
+}
+
+/// How many bars are reached, and how many are not.
+pub(crate) fn tally<'a>(reports: impl IntoIterator<Item = &'a Report>) -> [usize; 2] {
+    let findings: Vec<&Finding> = reports.into_iter().flat_map(|report| &report.findings).collect();
+    let reached = findings.iter().filter(|finding| finding.is_reached()).count();
+    [reached, findings.len() - reached]
+}
+
+/// Digits after the point.
+fn digits(value: f64) -> usize {
+    match value.abs() {
+        v if v.fract() == 0.0 && v < 1e6 => 0,
+        v if v < 1.0 => 4,
+        v if v < 10.0 => 3,
+        v if v < 100.0 => 2,
+        v if v < 1000.0 => 1,
+        _ => 0,
+    }
+}
+
+fn with_digits(value: f64, digits: usize) -> String {
+    let size = value.abs();
+    if value != 0.0 && !(1e-3..1e6).contains(&size) && value.is_finite() {
+        return format!("{value:.2e}");
+    }
+    format!("{value:.digits$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_digits_that_say_something() {
+        let numbers = [0.0107, 0.5, 9.4137, 29.0, 12.345, 123.456, 43210.7, 0.000123, 0.0, f64::NAN];
+        let expected = ["0.0107", "0.5000", "9.414", "29", "12.35", "123.5", "43211", "1.23e-4", "0", "NaN"];
+        assert_eq!(numbers.map(number), expected);
+    }
+
+    #[test]
+    fn a_number_that_misses_its_bar_never_looks_like_it() {
+        assert_eq!(apart(0.010_74, 0.0107), ["0.01074", "0.01070"]);
+        assert_eq!(apart(0.5, 0.5), ["0.5000", "0.5000"]);
+        assert_eq!(apart(1e-9, 1.001e-9), ["1e-9", "1.001e-9"]);
+        assert_eq!(beside(0.0101, 0.0107), "0.0101 / 0.0107 (0.94×)");
+        assert_eq!(beside(0.010_701, 0.0107), "0.010701 / 0.010700 (1.0001×)");
+        assert_eq!(beside(0.0107, 0.0), "0.0107 / 0");
+        let finding = Finding { name: "share".into(), value: 0.559_99, bar: Bar::AtLeast(0.56), cause: None };
+        assert_eq!(measured(&finding), ["0.55999", "at least 0.56000"]);
+    }
+
+    #[test]
+    fn times_are_read_at_a_glance() {
+        assert_eq!(
+            [0.04, 59.6, 200.0, 4320.0].map(duration),
+            ["0.0 s", "1 min 0 s", "3 min 20 s", "1 h 12 min"]
+        );
+    }
+}
