@@ -26,7 +26,7 @@ pub struct Statistics {
 
 impl Statistics {
     /// Of at least one value.
-    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
+    pub fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         let n = values.clone().count() as f64;
         let mean = values.clone().sum::<f64>() / n;
         let variance = values.clone().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);

@@ -3,11 +3,14 @@
 //! An [`Experiment`] is run with a [`Setting`] and makes a [`Report`]: data without any layout, which [`page`] makes a file of
 //! HTML of, and [`text`] a summary for terminals.
 
+mod album;
 mod experiment;
 mod experiments;
 mod number;
 mod page;
+mod probes;
 mod report;
+mod tables;
 mod text;
 mod write;
 

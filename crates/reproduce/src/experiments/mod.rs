@@ -1,10 +1,16 @@
 //! The list of experiments. Adding one takes a file of its own and a line here.
 
+mod conductors;
+mod ward_to_ggx;
+
 use crate::Experiment;
 
 /// All experiments, in the paper's order.
 #[rustfmt::skip] // one line per experiment
-static EXPERIMENTS: [Experiment; 0] = [
+static EXPERIMENTS: [Experiment; 3] = [
+    Experiment { name: "as-to-beckmann", reproduces: "Section 5.1, Table 2 (left), Figures 7 and 8", about: "metals, by roughness: Ashikhmin-Shirley to Cook-Torrance", run: conductors::to_beckmann },
+    Experiment { name: "as-to-ggx", reproduces: "Section 5.1, Table 2 (right), Figures 7 and 8", about: "metals, by roughness: Ashikhmin-Shirley to GGX", run: conductors::to_ggx },
+    Experiment { name: "ward-to-ggx", reproduces: "Section 5.2, Tables 4 and 5, Figures 9 and 11", about: "plastics: Ward to GGX, constrained and unconstrained", run: ward_to_ggx::run },
 ];
 
 /// All experiments, in the paper's order.
