@@ -2,7 +2,7 @@
 
 mod files;
 
-use glam::{DMat3, DVec3, Vec3A};
+use glam::{DMat3, DVec2, DVec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -30,6 +30,8 @@ struct Triangle {
     normals: Option<[DVec3; 3]>,
     /// Along growing texture coordinate u; 0 where the file has none.
     tangent: DVec3,
+    /// Texture coordinates at the corners; 0 where the file has none.
+    texture: [DVec2; 3],
 }
 
 /// Where a ray meets a mesh.
@@ -50,6 +52,8 @@ pub(crate) struct MeshPoint {
     pub(crate) normal: DVec3,
     /// Not perpendicular to the normal, nor of unit length; 0 where there is none.
     pub(crate) tangent: DVec3,
+    /// Texture coordinates, as they are in the file; 0 where there are none.
+    pub(crate) texture: [f64; 2],
 }
 
 /// What a file holds: corners with what belongs to each, and triangles of them.
@@ -137,7 +141,9 @@ impl TriangleMesh {
         let [v, w] = hit.weights;
         let smooth = triangle.normals.map(|[a, b, c]| a * (1.0 - v - w) + b * v + c * w);
         let normal = smooth.and_then(DVec3::try_normalize).unwrap_or(geometric);
-        MeshPoint { geometric, normal, tangent: triangle.tangent }
+        let [a, b, c] = triangle.texture;
+        let texture = (a * (1.0 - v - w) + b * v + c * w).to_array();
+        MeshPoint { geometric, normal, tangent: triangle.tangent, texture }
     }
 }
 
@@ -204,7 +210,8 @@ impl Soup {
         let edges = [b - a, c - a];
         edges[0].cross(edges[1]).try_normalize()?;
         let normals = (!self.normals.is_empty()).then(|| corners.map(|i| self.normals[i]));
-        Some(Triangle { corner: a, edges, normals, tangent: self.tangent(corners, edges) })
+        let texture = corners.map(|i| self.texture.get(i).copied().unwrap_or_default().into());
+        Some(Triangle { corner: a, edges, normals, tangent: self.tangent(corners, edges), texture })
     }
 
     /// How the position changes with texture coordinate u, up to length.
