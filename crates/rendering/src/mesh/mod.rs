@@ -1,6 +1,9 @@
-//! Triangle meshes: their files, and the first triangle that a ray meets.
+//! Triangle meshes: their files, shapes that need none, and the first triangle that a ray meets.
 
 mod files;
+mod shapes;
+
+use std::collections::HashMap;
 
 use glam::{DMat3, DVec2, DVec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -68,13 +71,14 @@ struct Soup {
 }
 
 impl TriangleMesh {
-    /// Reads a mesh and puts it in its place.
+    /// Reads or makes a mesh and puts it in its place.
     ///
     /// # Errors
     /// Where the file cannot be read, or holds no triangle with an area.
     pub(crate) fn load(mesh: &Mesh) -> Result<Self, SceneError> {
         let fault = |message| SceneError::Mesh { path: mesh.file.clone().into(), message };
-        let mut soup = files::read(mesh.file.as_ref()).map_err(fault)?;
+        let shape = shapes::named(&mesh.file).unwrap_or_else(|| files::read(mesh.file.as_ref()));
+        let mut soup = shape.map_err(fault)?;
         soup.check().map_err(fault)?;
         soup.place(mesh);
         Self::new(&soup).ok_or_else(|| fault("no triangle has an area".to_owned()))
@@ -193,6 +197,22 @@ impl Soup {
             return Err("there are no faces; expected at least one triangle".to_owned());
         }
         Ok(())
+    }
+
+    /// With a normal at each corner: the mean over the triangles about it, weighted by area. Corners at the same place share
+    /// theirs, also where the texture is cut apart.
+    fn smoothed(mut self) -> Self {
+        let place = |p: DVec3| p.to_array().map(f64::to_bits);
+        let mut sums: HashMap<[u64; 3], DVec3> = HashMap::new();
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|i| self.positions[i]);
+            for p in [a, b, c] {
+                *sums.entry(place(p)).or_default() += (b - a).cross(c - a);
+            }
+        }
+        let normal = |p: &DVec3| sums.get(&place(*p)).copied().unwrap_or_default().normalize_or(DVec3::Y);
+        self.normals = self.positions.iter().map(normal).collect();
+        self
     }
 
     /// Scales, turns and moves.
