@@ -44,6 +44,7 @@ mod rings;
 mod rows;
 mod sampling;
 mod scene;
+mod scenes;
 mod source;
 mod transport;
 

@@ -100,6 +100,20 @@ impl PathTracer {
         self.pixels(&self.uniform(material, part), pixels, &|_| ())
     }
 
+    /// [`PathTracer::radiance`] with several materials: see [`PathTracer::render_dressed`].
+    ///
+    /// # Panics
+    /// Where `wears` gives a number that no material has.
+    pub fn radiance_dressed(
+        &self,
+        materials: &[Material],
+        wears: Wears,
+        part: Part,
+        pixels: &[u32],
+    ) -> Vec<[f32; 3]> {
+        self.pixels(&Wardrobe::new(materials, wears, part, &self.world), pixels, &|_| ())
+    }
+
     /// A picture with several materials, linear RGB, row 0 on top: `wears` says which of them is worn at a point. Subjects
     /// with a diffuse colour of their own keep it. One material gives the bits of [`Render::render`].
     ///
