@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
+use std::io::ErrorKind::NotFound;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -15,8 +16,19 @@ use crate::pyramid::Pyramid;
 use crate::scene::EnvironmentLight;
 use crate::{Rgb, SceneError, designed_map};
 
-/// The map that ships with the program (CC0, see `assets/README.md`).
-const INTERIOR: &[u8] = include_bytes!("../assets/interior.exr");
+/// Maps that ship with the program (CC0, see `assets/README.md`).
+#[rustfmt::skip] // one line per map
+const SHIPPED: [(&str, &[u8]); 6] = [
+    ("interior", include_bytes!("../assets/interior.exr")),
+    ("city", include_bytes!("../assets/city.exr")),
+    ("forest", include_bytes!("../assets/forest.exr")),
+    ("night", include_bytes!("../assets/night.exr")),
+    ("studio", include_bytes!("../assets/studio.exr")),
+    ("sunset", include_bytes!("../assets/sunset.exr")),
+];
+
+/// The map that others are balanced to, and its scale such that a white surface on a table is just white.
+const BALANCE: (&str, f64) = ("interior", 0.35);
 
 /// The map is cut in two this often to give the lights of irradiance: 8192 of them.
 const LIGHT_CUTS: u32 = 13;
@@ -54,11 +66,18 @@ impl EnvironmentMap {
     pub(crate) fn content(light: &EnvironmentLight) -> Result<Cow<'static, [u8]>, SceneError> {
         let path = match light.map.as_str() {
             "designed" => return Ok(Cow::Borrowed(&[])),
-            "interior" => return Ok(Cow::Borrowed(INTERIOR)),
-            path => PathBuf::from(path),
+            name => PathBuf::from(name),
         };
-        let bytes = std::fs::read(&path);
-        let bytes = bytes.map_err(|source| ImageError::Io { path, action: "read", source })?;
+        if let Some((_, bytes)) = SHIPPED.iter().find(|(name, _)| *name == light.map) {
+            return Ok(Cow::Borrowed(bytes));
+        }
+        let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
+            // Perhaps a name was meant.
+            NotFound => {
+                SceneError::NoMap { map: light.map.clone(), names: EnvironmentLight::names().join(", ") }
+            }
+            _ => ImageError::Io { path, action: "read", source }.into(),
+        })?;
         Ok(Cow::Owned(bytes))
     }
 
@@ -134,11 +153,49 @@ impl EnvironmentMap {
     }
 }
 
+impl EnvironmentLight {
+    /// The maps that need no file: the designed one, and those that ship with the program.
+    pub fn names() -> Vec<&'static str> {
+        std::iter::once("designed").chain(SHIPPED.iter().map(|(name, _)| *name)).collect()
+    }
+
+    /// A map, scaled such that a white, horizontal surface is as bright (in luminance) as under the built-in validation
+    /// scenes' light, the map `interior` at a scale of 0.35: just white.
+    ///
+    /// # Errors
+    /// Where the map cannot be read, or gives no light from above.
+    pub fn balanced(map: impl Into<String>) -> Result<Self, SceneError> {
+        let light = Self::of(map);
+        let (balance, scale) = BALANCE;
+        let wanted = scale * upper_irradiance(&Self::of(balance))?;
+        let scale = wanted / upper_irradiance(&light)?;
+        if !(scale > 0.0 && scale.is_finite()) {
+            return Err(SceneError::DarkMap { map: light.map });
+        }
+        Ok(Self { scale, ..light })
+    }
+}
+
+/// Luminance of the irradiance of a horizontal surface that nothing shades.
+fn upper_irradiance(light: &EnvironmentLight) -> Result<f64, SceneError> {
+    let image = decode_image(light, &EnvironmentMap::content(light)?)?;
+    let (width, height) = (image.width(), image.height());
+    let grid = Grid { width, height, rotation: 0.0 };
+    // ∫ cos θ dω over a row is π (cos² θ₀ − cos² θ₁); the equator may lie within one.
+    let power = |(i, texel): (usize, &Rgb)| {
+        let [upper, lower] = [i / width, i / width + 1].map(|row| grid.edge(row).max(0.0));
+        luminance(*texel) * PI * (upper * upper - lower * lower) / width as f64
+    };
+    Ok(scaled(&image, 1.0).iter().enumerate().map(power).sum())
+}
+
 /// The image of a light from its [`EnvironmentMap::content`].
 pub(crate) fn decode_image(light: &EnvironmentLight, content: &[u8]) -> Result<Image, SceneError> {
     let image = match light.map.as_str() {
         "designed" => designed_map(),
-        "interior" => lookmatch_imaging::decode(Path::new("interior.exr"), content)?,
+        name if SHIPPED.iter().any(|(shipped, _)| *shipped == name) => {
+            lookmatch_imaging::decode(&Path::new(name).with_extension("exr"), content)?
+        }
         path => lookmatch_imaging::decode(Path::new(path), content)?,
     };
     if image.width() != 2 * image.height() {

@@ -10,8 +10,8 @@ use thiserror::Error;
 pub enum SceneError {
     /// The scene file cannot be read.
     #[error(
-        "cannot read scene '{}': {source}; expected a scene file, or a built-in scene: reference, spheres",
-        path.display()
+        "cannot read scene '{}': {source}; expected a scene file, or a built-in scene: {}",
+        path.display(), crate::scenes::names()
     )]
     Read {
         /// The file.
@@ -50,6 +50,24 @@ pub enum SceneError {
     /// The environment map cannot be used.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// The environment map is neither a file nor a name.
+    #[error(
+        "cannot read environment map '{map}': there is no such file; expected an .exr or .hdr file, or one of {names}"
+    )]
+    NoMap {
+        /// Name or path of the map.
+        map: String,
+        /// What needs no file.
+        names: String,
+    },
+    /// The environment map cannot be balanced.
+    #[error(
+        "environment map '{map}' gives no light from above; expected a map with some, to be balanced to others"
+    )]
+    DarkMap {
+        /// Name or path of the map.
+        map: String,
+    },
     /// The environment map does not cover the sphere of directions.
     #[error(
         "environment map '{map}' is {width} x {height} pixels; a latitude-longitude map is twice as wide as high"

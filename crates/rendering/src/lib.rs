@@ -44,6 +44,7 @@ mod rings;
 mod rows;
 mod sampling;
 mod scene;
+mod scenes;
 mod source;
 mod transport;
 
@@ -53,7 +54,7 @@ pub use environment::EnvironmentMap;
 pub use error::SceneError;
 pub use export::{EXPORT_FORMATS, ExportFormat, export};
 pub use lobes::{DiffuseKey, Lobes, SplitLobes};
-pub use path_tracer::PathTracer;
+pub use path_tracer::{PathTracer, Spot, Wears};
 pub use render::{RENDERERS, Render, RendererEntry};
 pub use renderer::{Part, Renderer, SplitPlanes};
 pub use scene::{Camera, EnvironmentLight, Illumination, Mesh, Plane, PointLight, Scene, Sphere};

@@ -26,6 +26,7 @@ use crate::{Rgb, SceneError};
 
 #[cfg(test)]
 mod accuracy;
+mod dressed;
 
 /// Which part of a material is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +57,7 @@ const PREPARED: f64 = 0.2;
 /// Subject pixels are those that see a sphere; everything else is the same in every picture.
 pub struct Renderer {
     field: LazyField,
+    bodies: Bodies,
     film: Film,
     /// What is seen beside the subjects, for every pixel.
     background: Vec<Rgb>,
@@ -125,6 +127,7 @@ impl Renderer {
         let highlights = Highlights::prepare(&field, &film, &subjects);
         let mask = subject_mask(scene, &film)?;
         Ok(Self {
+            bodies: field.bodies.clone(),
             field: LazyLock::new(Box::new(|| field)),
             film,
             background,
@@ -162,6 +165,12 @@ impl Renderer {
 
     /// Pictures of several materials, in their order: the prepared light is read once for all.
     pub fn render_batch(&self, materials: &[&Material], part: Part) -> Vec<Image> {
+        let worn_by_all = self.worn_by_all(materials, part);
+        worn_by_all.iter().map(|(planes, weights)| self.developed(planes, |_| *weights)).collect()
+    }
+
+    /// What the subject pixels show of some materials, and what each adds to the checkerboard.
+    fn worn_by_all(&self, materials: &[&Material], part: Part) -> Vec<(Planes, Weights)> {
         let bsdf = |m: &&Material| match part {
             Part::Full => m.bsdf(),
             Part::DiffuseOnly => m.diffuse_bsdf(),
@@ -170,7 +179,7 @@ impl Renderer {
         let planes = self.subject_planes(&lobes);
         let materials = lobes.bsdfs.iter().zip(&lobes.expanded);
         let weights = materials.map(|(bsdf, expanded)| self.weights(&**bsdf, expanded.as_deref()));
-        planes.iter().zip(weights).map(|(planes, weights)| self.developed(planes, &weights)).collect()
+        planes.into_iter().zip(weights).collect()
     }
 
     /// The irradiance that a material adds to the checkerboard, with or without its lobe.
@@ -179,8 +188,9 @@ impl Renderer {
         self.bounce.as_ref().map_or([[0.0; 3]; MODES], weights)
     }
 
-    /// The background with the subject pixels laid over it.
-    fn developed(&self, planes: &Planes, weights: &Weights) -> Image {
+    /// The background with the subject pixels laid over it, and what is added to the checkerboard in each of the pixels that
+    /// see it.
+    fn developed(&self, planes: &Planes, weights: impl Fn(usize) -> Weights) -> Image {
         let mut image = Image::new(self.film.size, self.film.size);
         for (out, b) in image.pixels_mut().iter_mut().zip(&self.background) {
             *out = [b.x, b.y, b.z];
@@ -189,9 +199,10 @@ impl Renderer {
             let out = &mut image.pixels_mut()[*pixel as usize];
             (0..3).for_each(|c| out[c] += planes[c][k]);
         }
-        for (pixel, modes) in &self.board {
+        for (k, (pixel, modes)) in self.board.iter().enumerate() {
+            let weights = weights(k);
             let out = &mut image.pixels_mut()[*pixel as usize];
-            (0..3).for_each(|c| out[c] += modes.iter().zip(weights).map(|(m, w)| m * w[c]).sum::<f32>());
+            (0..3).for_each(|c| out[c] += modes.iter().zip(&weights).map(|(m, w)| m * w[c]).sum::<f32>());
         }
         image
     }
@@ -325,10 +336,12 @@ impl Renderer {
     pub(crate) fn read(source: &Source, input: &mut Reader) -> io::Result<Self> {
         let film = Film::new(&source.scene.camera, source.size);
         let mask = subject_mask(&source.scene, &film).map_err(io::Error::other)?;
+        let bodies = Bodies::new(&source.scene);
         let source = source.clone();
         // The file of the map may be gone by now: its content was read with the source, and baked before under the same key.
         let bake = move || source.bake_apart().expect("the same content was baked before");
         Ok(Self {
+            bodies,
             field: LazyLock::new(Box::new(bake)),
             film,
             background: input.vec()?,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::SceneError;
+use crate::{SceneError, scenes};
 
 /// A scene; its TOML form is described in `docs/scene-format.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,7 +64,7 @@ fn optional_vector<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<
     Ok(Some(v))
 }
 
-fn up() -> [f64; 3] {
+pub(crate) fn up() -> [f64; 3] {
     [0.0, 1.0, 0.0]
 }
 
@@ -87,7 +87,8 @@ pub struct Sphere {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
-    /// Path of an .obj or .ply file.
+    /// Path of an .obj or .ply file, packed (.obj.gz, .ply.gz) or not; or a shape that needs none: `blob:SEED`, `square`,
+    /// `spot`, `shader-ball`.
     pub file: String,
     /// Where the origin of the file's coordinates lies, in metres.
     #[serde(deserialize_with = "vector")]
@@ -137,7 +138,8 @@ pub struct PointLight {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentLight {
-    /// `designed` (the reference map), `interior` (shipped), or the path of an .exr or .hdr file.
+    /// The path of an .exr or .hdr file, or one of [`EnvironmentLight::names`]: `designed` (the reference map), `interior`,
+    /// `city`, `forest`, `night`, `studio`, `sunset`.
     pub map: String,
     /// Factor on its radiance, above 0.
     #[serde(default = "one")]
@@ -183,50 +185,14 @@ impl Illumination {
 }
 
 impl Scene {
-    /// The reference scene (Guarnera *et al.* 2018, 3.1): a sphere on a checkerboard, a point light with inverse-square
-    /// fall-off, and the designed environment map.
-    pub fn reference() -> Self {
-        Self {
-            name: "reference".into(),
-            camera: Camera { eye: [0.0, 1.5, 6.0], target: [0.0, -0.1, 0.0], up: up(), vertical_fov: 28.0 },
-            spheres: vec![Sphere { centre: [0.0; 3], radius: 1.0, diffuse: None }],
-            meshes: Vec::new(),
-            plane: Some(checkerboard(4.0)),
-            point_lights: vec![PointLight { position: [-3.0, 4.0, 4.0], intensity: [60.0; 3] }],
-            environment: Some(EnvironmentLight::of("designed")),
-        }
-    }
-
-    /// The validation scene (5.1 and 5.2): three spheres of the same radius and different diffuse colours on a
-    /// checkerboard, lit by a point light and a real HDR map that no search has seen.
-    pub fn spheres() -> Self {
-        let sphere =
-            |x: f64, z: f64, diffuse| Sphere { centre: [x, 0.0, z], radius: 1.0, diffuse: Some(diffuse) };
-        Self {
-            name: "spheres".into(),
-            camera: Camera { eye: [0.0, 2.3, 9.0], target: [0.0, -0.1, 0.0], up: up(), vertical_fov: 40.0 },
-            spheres: vec![
-                sphere(-2.1, 0.0, [0.50, 0.09, 0.06]),
-                sphere(0.0, 0.0, [0.10, 0.38, 0.12]),
-                sphere(2.1, 0.0, [0.08, 0.14, 0.45]),
-            ],
-            meshes: Vec::new(),
-            plane: Some(checkerboard(8.0)),
-            point_lights: vec![PointLight { position: [-4.0, 5.0, 5.0], intensity: [25.0; 3] }],
-            // Scaled so that a white surface on the table is just white.
-            environment: Some(EnvironmentLight { scale: 0.35, ..EnvironmentLight::of("interior") }),
-        }
-    }
-
     /// A built-in scene by name, or a scene file.
     ///
     /// # Errors
     /// Where the file cannot be read, has an unknown or missing field, or describes no scene.
     pub fn load(name: &str) -> Result<Self, SceneError> {
-        match name {
-            "reference" => Ok(Self::reference()),
-            "spheres" => Ok(Self::spheres()),
-            path => Self::read(Path::new(path)),
+        match scenes::BUILT_IN.iter().find(|(built_in, _)| *built_in == name) {
+            Some((_, scene)) => Ok(scene()),
+            None => Self::read(Path::new(name)),
         }
     }
 
@@ -426,9 +392,4 @@ impl EnvironmentLight {
             Fault::new("environment.rotation", self.rotation, self.rotation.is_finite(), "degrees"),
         ]
     }
-}
-
-/// The checkerboard of the built-in scenes, under unit spheres at height 0.
-fn checkerboard(half_extent: f64) -> Plane {
-    Plane { height: -1.0, half_extent, check_size: 0.5, light: [0.6; 3], dark: [0.15; 3] }
 }

@@ -1,29 +1,40 @@
-//! Mesh files: Wavefront OBJ and PLY.
+//! Mesh files: Wavefront OBJ and PLY, as they are or packed with gzip.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
+use flate2::read::MultiGzDecoder;
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::DefaultElement;
 
 use super::Soup;
+use super::shapes::NAMES;
 
 /// Reads a file by its extension; errors say what is wrong with it.
 pub(super) fn read(path: &Path) -> Result<Soup, String> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let read = match extension.as_str() {
-        "obj" => obj,
-        "ply" => ply,
-        _ => return Err("a mesh file ends in .obj or .ply".to_owned()),
-    };
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    read(&mut BufReader::new(file))
+    let extension = |path: &Path| path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let is_packed = extension(path) == "gz";
+    let inner =
+        if is_packed { extension(path.file_stem().unwrap_or_default().as_ref()) } else { extension(path) };
+    let file = || File::open(path).map_err(|error| error.to_string());
+    match &*inner {
+        "obj" | "ply" if is_packed => decode(&inner, &mut BufReader::new(MultiGzDecoder::new(file()?))),
+        "obj" | "ply" => decode(&inner, &mut BufReader::new(file()?)),
+        _ => Err(format!(
+            "a mesh is a file that ends in .obj or .ply, perhaps packed (.obj.gz, .ply.gz), or one of {NAMES}"
+        )),
+    }
+}
+
+/// Reads the content of a file by its extension, without that of a packed one.
+pub(super) fn decode(extension: &str, reader: &mut impl BufRead) -> Result<Soup, String> {
+    if extension == "ply" { ply(reader) } else { obj(reader) }
 }
 
 /// All groups of the file; its materials do not matter.
-fn obj(reader: &mut BufReader<File>) -> Result<Soup, String> {
+fn obj(reader: &mut impl BufRead) -> Result<Soup, String> {
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
     let no_materials = |_: &Path| Ok(Default::default());
     let (models, _) = tobj::load_obj_buf(reader, &options, no_materials)
@@ -58,7 +69,7 @@ fn vectors(numbers: &[f32]) -> impl Iterator<Item = DVec3> {
 }
 
 /// Elements `vertex` (x, y, z, and where there are any nx, ny, nz and u, v or s, t) and `face`.
-fn ply(reader: &mut BufReader<File>) -> Result<Soup, String> {
+fn ply(reader: &mut impl BufRead) -> Result<Soup, String> {
     let parser = Parser::<DefaultElement>::new();
     let file = parser.read_ply(reader).map_err(|error| format!("no PLY file: {error}"))?;
     let elements = |name: &str| file.payload.get(name).map(Vec::as_slice).unwrap_or_default();

@@ -1,8 +1,11 @@
-//! Triangle meshes: their files, and the first triangle that a ray meets.
+//! Triangle meshes: their files, shapes that need none, and the first triangle that a ray meets.
 
 mod files;
+mod shapes;
 
-use glam::{DMat3, DVec3, Vec3A};
+use std::collections::HashMap;
+
+use glam::{DMat3, DVec2, DVec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -30,6 +33,8 @@ struct Triangle {
     normals: Option<[DVec3; 3]>,
     /// Along growing texture coordinate u; 0 where the file has none.
     tangent: DVec3,
+    /// Texture coordinates at the corners; 0 where the file has none.
+    texture: [DVec2; 3],
 }
 
 /// Where a ray meets a mesh.
@@ -50,6 +55,8 @@ pub(crate) struct MeshPoint {
     pub(crate) normal: DVec3,
     /// Not perpendicular to the normal, nor of unit length; 0 where there is none.
     pub(crate) tangent: DVec3,
+    /// Texture coordinates, as they are in the file; 0 where there are none.
+    pub(crate) texture: [f64; 2],
 }
 
 /// What a file holds: corners with what belongs to each, and triangles of them.
@@ -64,13 +71,14 @@ struct Soup {
 }
 
 impl TriangleMesh {
-    /// Reads a mesh and puts it in its place.
+    /// Reads or makes a mesh and puts it in its place.
     ///
     /// # Errors
     /// Where the file cannot be read, or holds no triangle with an area.
     pub(crate) fn load(mesh: &Mesh) -> Result<Self, SceneError> {
         let fault = |message| SceneError::Mesh { path: mesh.file.clone().into(), message };
-        let mut soup = files::read(mesh.file.as_ref()).map_err(fault)?;
+        let shape = shapes::named(&mesh.file).unwrap_or_else(|| files::read(mesh.file.as_ref()));
+        let mut soup = shape.map_err(fault)?;
         soup.check().map_err(fault)?;
         soup.place(mesh);
         Self::new(&soup).ok_or_else(|| fault("no triangle has an area".to_owned()))
@@ -137,7 +145,9 @@ impl TriangleMesh {
         let [v, w] = hit.weights;
         let smooth = triangle.normals.map(|[a, b, c]| a * (1.0 - v - w) + b * v + c * w);
         let normal = smooth.and_then(DVec3::try_normalize).unwrap_or(geometric);
-        MeshPoint { geometric, normal, tangent: triangle.tangent }
+        let [a, b, c] = triangle.texture;
+        let texture = (a * (1.0 - v - w) + b * v + c * w).to_array();
+        MeshPoint { geometric, normal, tangent: triangle.tangent, texture }
     }
 }
 
@@ -189,6 +199,22 @@ impl Soup {
         Ok(())
     }
 
+    /// With a normal at each corner: the mean over the triangles about it, weighted by area. Corners at the same place share
+    /// theirs, also where the texture is cut apart.
+    fn smoothed(mut self) -> Self {
+        let place = |p: DVec3| p.to_array().map(f64::to_bits);
+        let mut sums: HashMap<[u64; 3], DVec3> = HashMap::new();
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|i| self.positions[i]);
+            for p in [a, b, c] {
+                *sums.entry(place(p)).or_default() += (b - a).cross(c - a);
+            }
+        }
+        let normal = |p: &DVec3| sums.get(&place(*p)).copied().unwrap_or_default().normalize_or(DVec3::Y);
+        self.normals = self.positions.iter().map(normal).collect();
+        self
+    }
+
     /// Scales, turns and moves.
     fn place(&mut self, mesh: &Mesh) {
         // Positive angles move what is at −Z towards +X, as those of an environment do.
@@ -204,7 +230,8 @@ impl Soup {
         let edges = [b - a, c - a];
         edges[0].cross(edges[1]).try_normalize()?;
         let normals = (!self.normals.is_empty()).then(|| corners.map(|i| self.normals[i]));
-        Some(Triangle { corner: a, edges, normals, tangent: self.tangent(corners, edges) })
+        let texture = corners.map(|i| self.texture.get(i).copied().unwrap_or_default().into());
+        Some(Triangle { corner: a, edges, normals, tangent: self.tangent(corners, edges), texture })
     }
 
     /// How the position changes with texture coordinate u, up to length.

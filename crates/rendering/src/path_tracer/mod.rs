@@ -11,6 +11,7 @@ mod glint;
 mod sampler;
 mod sky;
 mod vertex;
+mod wardrobe;
 mod world;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,8 +26,11 @@ use crate::scene::{Illumination, Scene};
 use crate::{EnvironmentMap, Part, Render, SceneError};
 use sampler::{Points, Sampler};
 use sky::Sky;
-use vertex::{Coat, Lobe, Targets, Vertex};
+use vertex::{Targets, Vertex};
+use wardrobe::Wardrobe;
 use world::{Encounter, World};
+
+pub use wardrobe::{Spot, Wears};
 
 /// Most samples of a pixel: their table takes 16 bytes each.
 const MOST_SAMPLES: u32 = 1 << 20;
@@ -93,57 +97,99 @@ impl PathTracer {
 
     /// Estimates of chosen pixels (row by row from the top left), linear RGB, with all that is seen in them.
     pub fn radiance(&self, material: &Material, part: Part, pixels: &[u32]) -> Vec<[f32; 3]> {
-        self.observed_radiance(material, part, pixels, &|_| ())
+        self.pixels(&self.uniform(material, part), pixels, &|_| ())
     }
 
-    /// [`PathTracer::radiance`] that tells now and then how many pixels are done.
-    fn observed_radiance(
+    /// [`PathTracer::radiance`] with several materials: see [`PathTracer::render_dressed`].
+    ///
+    /// # Panics
+    /// Where `wears` gives a number that no material has.
+    pub fn radiance_dressed(
         &self,
-        material: &Material,
+        materials: &[Material],
+        wears: Wears,
         part: Part,
         pixels: &[u32],
-        observe: &(dyn Fn(usize) + Sync),
     ) -> Vec<[f32; 3]> {
-        let bsdf = match part {
-            Part::Full => material.bsdf(),
-            Part::DiffuseOnly => material.diffuse_bsdf(),
-        };
-        let lobe = |sampling: lookmatch_materials::Sampling| Lobe { alpha: sampling.width(), sampling };
-        let coat = Coat { bsdf: &*bsdf, diffuse: bsdf.diffuse().into(), lobe: bsdf.sampling().map(lobe) };
+        self.pixels(&Wardrobe::new(materials, wears, part, &self.world), pixels, &|_| ())
+    }
+
+    /// A picture with several materials, linear RGB, row 0 on top: `wears` says which of them is worn at a point. Subjects
+    /// with a diffuse colour of their own keep it. One material gives the bits of [`Render::render`].
+    ///
+    /// # Panics
+    /// Where `wears` gives a number that no material has.
+    pub fn render_dressed(&self, materials: &[Material], wears: Wears, part: Part) -> Image {
+        self.render_dressed_observed(materials, wears, part, &|_| ())
+    }
+
+    /// [`PathTracer::render_dressed`], with the number of pixels that are done told now and then, from any thread.
+    ///
+    /// # Panics
+    /// Where `wears` gives a number that no material has.
+    pub fn render_dressed_observed(
+        &self,
+        materials: &[Material],
+        wears: Wears,
+        part: Part,
+        observe: &(dyn Fn(usize) + Sync),
+    ) -> Image {
+        self.picture(&Wardrobe::new(materials, wears, part, &self.world), observe)
+    }
+
+    /// One material all over.
+    fn uniform(&self, material: &Material, part: Part) -> Wardrobe<'static> {
+        Wardrobe::new(std::slice::from_ref(material), &|_| 0, part, &self.world)
+    }
+
+    fn picture(&self, wardrobe: &Wardrobe, observe: &(dyn Fn(usize) + Sync)) -> Image {
+        let size = self.film.size;
+        let pixels: Vec<u32> = (0..(size * size) as u32).collect();
+        let values = self.pixels(wardrobe, &pixels, observe);
+        Image::from_fn(size, size, |x, y| values[y * size + x])
+    }
+
+    /// Chosen pixels; how many are done is told now and then.
+    fn pixels(&self, wardrobe: &Wardrobe, pixels: &[u32], observe: &(dyn Fn(usize) + Sync)) -> Vec<[f32; 3]> {
         let done = AtomicUsize::new(0);
         let pixel = |pixel: &u32| {
-            let value = self.pixel(&coat, *pixel).as_vec3().to_array();
+            let value = self.pixel(wardrobe, *pixel).as_vec3().to_array();
             observe(1 + done.fetch_add(1, Ordering::Relaxed));
             value
         };
         pixels.par_iter().map(pixel).collect()
     }
 
-    fn pixel(&self, coat: &Coat, pixel: u32) -> DVec3 {
+    fn pixel(&self, wardrobe: &Wardrobe, pixel: u32) -> DVec3 {
         let (x, y) = (pixel as usize % self.film.size, pixel as usize / self.film.size);
         let sample = |index| {
             let sampler = self.points.path(self.seed, pixel, index);
             let [dx, dy] = sampler.set(0).pair(0, 0);
-            self.seen(coat, self.film.direction(x as f64 + dx, y as f64 + dy), &sampler)
+            self.seen(wardrobe, self.film.direction(x as f64 + dx, y as f64 + dy), &sampler)
         };
         (0..self.samples).map(sample).sum::<DVec3>() / f64::from(self.samples)
     }
 
     /// Radiance that the eye receives from a direction.
-    fn seen(&self, coat: &Coat, direction: DVec3, sampler: &Sampler) -> DVec3 {
+    fn seen(&self, wardrobe: &Wardrobe, direction: DVec3, sampler: &Sampler) -> DVec3 {
         match self.world.first(self.film.eye, direction, None) {
-            Some(at) => self.reflected(&self.vertex(coat, at, -direction), sampler, Walk::START),
+            Some(at) => {
+                let vertex = self.vertex(wardrobe, at, -direction);
+                self.reflected(wardrobe, &vertex, sampler, Walk::START)
+            }
             None => self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.radiance(direction)),
         }
     }
 
-    fn vertex<'a>(&'a self, coat: &'a Coat, at: Encounter, to_viewer: DVec3) -> Vertex<'a> {
-        let targets = Targets { spheres: &self.world.spheres, lights: &self.spots };
-        Vertex::new(at, to_viewer, self.world.diffuse(&at, coat.diffuse), coat, targets)
+    fn vertex<'a>(&'a self, wardrobe: &'a Wardrobe, at: Encounter, to_viewer: DVec3) -> Vertex<'a> {
+        let targets = Targets { spheres: &wardrobe.balls, lights: &self.spots };
+        let coat = wardrobe.coat(&self.world, &at);
+        let diffuse = self.world.diffuse(&at, coat.map_or(DVec3::ZERO, |coat| coat.diffuse));
+        Vertex::new(at, to_viewer, diffuse, coat.and_then(|coat| coat.lobe.as_ref()), targets)
     }
 
     /// Radiance that a point reflects to where it is seen from.
-    fn reflected(&self, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
+    fn reflected(&self, wardrobe: &Wardrobe, vertex: &Vertex, sampler: &Sampler, walk: Walk) -> DVec3 {
         let splits = if walk.depth == 0 { SPLITS } else { 1 };
         let numbers = walk.numbers(sampler);
         let mut sum = self.lit_by_points(vertex);
@@ -166,8 +212,8 @@ impl PathTracer {
             let branch = if walk.depth == 0 { k } else { walk.branch };
             let next_walk = Walk { depth: walk.depth + 1, branch, strength: walk.strength * vertex.albedo };
             let Some((walk, chance)) = next_walk.survive(sampler) else { continue };
-            let next = self.vertex(vertex.coat(), at, -direction);
-            sum += scattering.value * self.reflected(&next, sampler, walk) / (density * chance);
+            let next = self.vertex(wardrobe, at, -direction);
+            sum += scattering.value * self.reflected(wardrobe, &next, sampler, walk) / (density * chance);
         }
         sum
     }
@@ -252,9 +298,6 @@ impl Render for PathTracer {
     }
 
     fn render_observed(&self, material: &Material, part: Part, observe: &(dyn Fn(usize) + Sync)) -> Image {
-        let size = self.film.size;
-        let pixels: Vec<u32> = (0..(size * size) as u32).collect();
-        let values = self.observed_radiance(material, part, &pixels, observe);
-        Image::from_fn(size, size, |x, y| values[y * size + x])
+        self.picture(&self.uniform(material, part), observe)
     }
 }

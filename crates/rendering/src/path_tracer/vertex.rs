@@ -3,9 +3,10 @@
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 use glam::DVec3;
-use lookmatch_materials::{Bsdf, Geometry, Sampling};
+use lookmatch_materials::Geometry;
 
 use super::glint::Glint;
+use super::wardrobe::{Ball, Lobe};
 use super::world::{Encounter, Surface};
 use crate::film::{to_local, to_world};
 
@@ -14,24 +15,10 @@ const SPHERES: f64 = 0.5;
 /// Share of the reflected lights among the directions towards a sphere with a lobe.
 const GLINTS: f64 = 0.5;
 
-/// The material of all subjects.
-pub(super) struct Coat<'a> {
-    pub(super) bsdf: &'a dyn Bsdf,
-    pub(super) diffuse: DVec3,
-    pub(super) lobe: Option<Lobe>,
-}
-
-/// What a material has beside its Lambert term.
-pub(super) struct Lobe {
-    pub(super) sampling: Sampling,
-    /// Width of its narrowest part.
-    pub(super) alpha: f64,
-}
-
 /// Spheres, and lights that they reflect in narrow lobes: what directions are aimed at.
 #[derive(Clone, Copy)]
 pub(super) struct Targets<'a> {
-    pub(super) spheres: &'a [(DVec3, f64)],
+    pub(super) spheres: &'a [Ball],
     /// Places of what is small and bright.
     pub(super) lights: &'a [DVec3],
 }
@@ -42,7 +29,6 @@ pub(super) struct Targets<'a> {
 /// a diffuse point by their highlights. All densities are of the whole mixture, in 1/sr.
 pub(super) struct Vertex<'a> {
     pub(super) at: Encounter,
-    coat: &'a Coat<'a>,
     targets: Targets<'a>,
     /// Towards the viewer, in the local frame.
     wo: [f64; 3],
@@ -71,20 +57,19 @@ pub(super) struct Scattering {
 }
 
 impl<'a> Vertex<'a> {
-    /// A point with a diffuse reflectance, seen from the direction of a unit vector.
+    /// A point with a diffuse reflectance and perhaps a lobe, seen from the direction of a unit vector.
     pub(super) fn new(
         at: Encounter,
         to_viewer: DVec3,
         diffuse: DVec3,
-        coat: &'a Coat<'a>,
+        lobe: Option<&'a Lobe>,
         targets: Targets<'a>,
     ) -> Self {
         // The checkerboard looks the same from everywhere.
         let is_board = at.surface == Surface::Plane;
         let wo = if is_board { [0.0, 0.0, 1.0] } else { to_local(&at.frame, to_viewer) };
-        let lobe = coat.lobe.as_ref().filter(|_| !is_board);
         let shares = Shares { lobe: 0.0, cosine: 1.0, spheres: 0.0 };
-        let mut vertex = Self { at, coat, targets, wo, diffuse, lobe, shares, albedo: 0.0 };
+        let mut vertex = Self { at, targets, wo, diffuse, lobe, shares, albedo: 0.0 };
         let reflectance = vertex.lobe.map_or(0.0, |l| vertex.mirror_reflectance(l));
         vertex.shares = vertex.fair_shares(reflectance);
         vertex.albedo = reflectance + diffuse.max_element();
@@ -107,13 +92,8 @@ impl<'a> Vertex<'a> {
     fn mirror_reflectance(&self, lobe: &Lobe) -> f64 {
         let [x, y, z] = self.wo;
         let Some(g) = Geometry::new([-x, -y, z], self.wo) else { return 0.0 };
-        let value: f64 = self.coat.bsdf.specular(&g).iter().sum();
+        let value: f64 = lobe.bsdf.specular(&g).iter().sum();
         (value / 3.0 * g.cos_i() / lobe.sampling.density(g.wi, g.wo)).clamp(1e-3, 1.0)
-    }
-
-    /// The material of the subjects.
-    pub(super) fn coat(&self) -> &'a Coat<'a> {
-        self.coat
     }
 
     /// BRDF times cosine for a unit direction, with its density; `None` where no light is scattered.
@@ -126,7 +106,7 @@ impl<'a> Vertex<'a> {
         let mut value = self.diffuse * (cos * FRAC_1_PI);
         let mut density = self.shares.cosine * cos * FRAC_1_PI;
         if let Some(lobe) = &self.lobe {
-            value += DVec3::from(self.coat.bsdf.specular(&g)) * cos;
+            value += DVec3::from(lobe.bsdf.specular(&g)) * cos;
             density += self.shares.lobe * lobe.sampling.density(g.wi, g.wo);
         }
         if self.shares.spheres > 0.0 {
@@ -141,7 +121,7 @@ impl<'a> Vertex<'a> {
             return DVec3::ZERO;
         }
         let Some(g) = Geometry::new(to_local(&self.at.frame, direction), self.wo) else { return DVec3::ZERO };
-        let specular = self.lobe.map_or(DVec3::ZERO, |_| self.coat.bsdf.specular(&g).into());
+        let specular = self.lobe.map_or(DVec3::ZERO, |lobe| lobe.bsdf.specular(&g).into());
         (self.diffuse * FRAC_1_PI + specular) * g.cos_i()
     }
 
@@ -160,26 +140,25 @@ impl<'a> Vertex<'a> {
     }
 
     /// Spheres that rise above the horizon, from outside.
-    fn visible_spheres(&self) -> impl Iterator<Item = (DVec3, f64)> {
+    fn visible_spheres(&self) -> impl Iterator<Item = Ball> {
         let own = match self.at.surface {
             Surface::Sphere(k) => k,
             _ => usize::MAX,
         };
         let has_diffuse = self.diffuse != DVec3::ZERO;
-        self.targets.spheres.iter().enumerate().filter_map(move |(k, (centre, radius))| {
-            let to_centre = *centre - self.at.position;
-            let rises = to_centre.dot(self.at.frame[2]) > -radius;
-            let outside = to_centre.length_squared() > radius * radius;
-            (has_diffuse && k != own && rises && outside).then_some((*centre, *radius))
+        self.targets.spheres.iter().enumerate().filter_map(move |(k, ball)| {
+            let to_centre = ball.centre - self.at.position;
+            let rises = to_centre.dot(self.at.frame[2]) > -ball.radius;
+            let outside = to_centre.length_squared() > ball.radius * ball.radius;
+            (has_diffuse && k != own && rises && outside).then_some(*ball)
         })
     }
 
     /// The highlights that a sphere throws here, and their share of the directions towards it.
-    fn glints(&self, sphere: (DVec3, f64)) -> (f64, impl Iterator<Item = Option<Glint>>) {
-        let alpha = self.coat.lobe.as_ref().map_or(0.0, |l| l.alpha);
+    fn glints(&self, Ball { centre, radius, alpha }: Ball) -> (f64, impl Iterator<Item = Option<Glint>>) {
         let share = if alpha > 0.0 && !self.targets.lights.is_empty() { GLINTS } else { 0.0 };
         let position = self.at.position;
-        (share, self.targets.lights.iter().map(move |l| Glint::new(position, sphere, *l, alpha)))
+        (share, self.targets.lights.iter().map(move |l| Glint::new(position, (centre, radius), *l, alpha)))
     }
 
     fn sample_spheres(&self, [u, v]: [f64; 2]) -> Option<DVec3> {
@@ -219,7 +198,7 @@ struct Cone {
 }
 
 impl Cone {
-    fn new(point: DVec3, (centre, radius): (DVec3, f64)) -> Self {
+    fn new(point: DVec3, Ball { centre, radius, .. }: Ball) -> Self {
         let to_centre = centre - point;
         let sin2 = radius * radius / to_centre.length_squared();
         Self { to_centre, radius2: radius * radius, height: sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt()) }

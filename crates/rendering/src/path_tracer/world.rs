@@ -1,7 +1,10 @@
 //! Everything that a path can meet: spheres, meshes, the checkerboard.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::DVec3;
 
+use super::wardrobe::Spot;
 use crate::SceneError;
 use crate::bodies::{Bodies, Body};
 use crate::mesh::{MeshHit, TriangleMesh};
@@ -37,6 +40,8 @@ pub(super) struct Encounter {
     pub(super) frame: [DVec3; 3],
     /// Normal of the surface itself: nothing that lies below it gives light.
     pub(super) geometric: DVec3,
+    /// Texture coordinates of a mesh; those of spheres are worked out where they are asked for.
+    texture: [f64; 2],
 }
 
 impl World {
@@ -68,12 +73,14 @@ impl World {
             (None, Some((_, Body::Sphere(k)))) => {
                 let normal = self.bodies.normal(k, position);
                 let frame = frame(normal, DVec3::ZERO);
-                Some(Encounter { position, surface: Surface::Sphere(k), frame, geometric: normal })
+                let surface = Surface::Sphere(k);
+                Some(Encounter { position, surface, frame, geometric: normal, texture: [0.0; 2] })
             }
             (None, Some((_, Body::Plane))) => {
                 // It is lit from above, also where it is seen from below.
                 let frame = [DVec3::Z, DVec3::X, DVec3::Y];
-                Some(Encounter { position, surface: Surface::Plane, frame, geometric: DVec3::Y })
+                let surface = Surface::Plane;
+                Some(Encounter { position, surface, frame, geometric: DVec3::Y, texture: [0.0; 2] })
             }
             (None, None) => None,
         }
@@ -98,6 +105,16 @@ impl World {
         }
     }
 
+    /// The spot of a subject that a point lies on; `None` on the checkerboard.
+    pub(super) fn spot(&self, encounter: &Encounter) -> Option<Spot> {
+        let (subject, [u, v]) = match encounter.surface {
+            Surface::Sphere(k) => (k, sphere_texture(encounter.geometric)),
+            Surface::Mesh(k, _) => (self.spheres.len() + k, encounter.texture),
+            Surface::Plane => return None,
+        };
+        Some(Spot { subject, texture: [wrapped(u), wrapped(v)] })
+    }
+
     /// Both sides of a mesh are surfaces: normals are turned towards where the ray comes from.
     fn on_mesh(&self, (k, hit): (usize, MeshHit), position: DVec3, direction: DVec3) -> Encounter {
         let point = self.meshes[k].at(&hit);
@@ -107,7 +124,8 @@ impl World {
         // A smooth normal that is seen from behind, as happens along silhouettes, would be black.
         let normal = if smooth.dot(direction) < 0.0 { smooth } else { geometric };
         let frame = frame(normal, point.tangent);
-        Encounter { position, surface: Surface::Mesh(k, hit.triangle), frame, geometric }
+        let surface = Surface::Mesh(k, hit.triangle);
+        Encounter { position, surface, frame, geometric, texture: point.texture }
     }
 }
 
@@ -134,4 +152,15 @@ fn frame(normal: DVec3, tangent: DVec3) -> [DVec3; 3] {
     let across = |t: DVec3| (t - normal * t.dot(normal)).try_normalize();
     let tangent = across(tangent).or_else(|| across(DVec3::Y.cross(normal))).unwrap_or(DVec3::X);
     [tangent, normal.cross(tangent), normal]
+}
+
+/// As [`Spot::texture`] says.
+fn sphere_texture(normal: DVec3) -> [f64; 2] {
+    [(-normal.x).atan2(-normal.z) / TAU, 1.0 - normal.y.clamp(-1.0, 1.0).acos() / PI]
+}
+
+/// Repeats a texture; the remainder of something just below 0 rounds to 1.
+fn wrapped(x: f64) -> f64 {
+    let rest = x.rem_euclid(1.0);
+    if rest < 1.0 { rest } else { 0.0 }
 }
