@@ -1,5 +1,6 @@
 //! What an experiment found, without any layout: what a page, a terminal and a machine are told.
 
+use lookmatch_imaging::Verdict;
 use serde::{Deserialize, Serialize};
 
 /// All experiments of one run: what becomes one page.
@@ -157,29 +158,6 @@ pub struct Picture {
     pub jod: Option<f64>,
     /// What people would say.
     pub verdict: Option<Verdict>,
-}
-
-/// What people would say of two pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Nobody would tell.
-    Indistinguishable,
-    /// Some would, if they look closely.
-    SlightlyDifferent,
-    /// Most would.
-    NoticeablyDifferent,
-}
-
-impl Verdict {
-    /// As people read it.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Indistinguishable => "indistinguishable",
-            Self::SlightlyDifferent => "slightly different",
-            Self::NoticeablyDifferent => "noticeably different",
-        }
-    }
 }
 
 /// A drawn figure.

@@ -60,7 +60,7 @@ fn dressed(model: &str, roughness: f64) -> anyhow::Result<[Material; 3]> {
 /// Its picture, and its picture alone.
 fn picture(renderer: &Renderer, model: &str, roughness: f64) -> anyhow::Result<Image> {
     let materials = dressed(model, roughness)?;
-    Ok(renderer.render_dressed(&materials.each_ref()))
+    Ok(renderer.render_dressed(&materials.each_ref(), Part::Full))
 }
 
 fn channel_mean(channels: [f64; 3]) -> f64 {

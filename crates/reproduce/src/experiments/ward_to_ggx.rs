@@ -3,7 +3,6 @@
 use lookmatch_imaging::{Image, Mask, nrmsd};
 use lookmatch_materials::Material;
 use lookmatch_plots::draw_probe;
-use lookmatch_rendering::{Illumination, Part, Renderer};
 use lookmatch_remap::{
     Baseline, Endpoint, MethodScores, Options, Plan, Preset, Probe, Strategy, ValidationReport, Validator,
     validation_points,

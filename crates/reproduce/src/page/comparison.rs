@@ -7,7 +7,8 @@ use maud::{Markup, html};
 
 use super::embedded;
 use crate::number::number;
-use crate::{Comparison, Picture, Verdict};
+use crate::{Comparison, Picture};
+use lookmatch_imaging::Verdict;
 
 /// Colours that the scale of error maps is drawn with; the browser fills in those between.
 const STOPS: usize = 17;
