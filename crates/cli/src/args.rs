@@ -363,8 +363,8 @@ pub(crate) struct ValidateArgs {
     /// Number of source points, evenly spread; all of the probe's if not given
     #[arg(long)]
     pub(crate) points: Option<usize>,
-    /// Number of them, evenly spread, that are also judged by the metrics of the eye, which take longer than rendering: a number, or
-    /// all
+    /// Number of them, evenly spread, that are also judged by the metrics of the eye, which take a quarter of a second a pair: a
+    /// number, or all
     #[arg(long, value_name = "COUNT", default_value = "48", value_parser = metric_points)]
     pub(crate) metric_points: usize,
     /// Side of the pictures in pixels

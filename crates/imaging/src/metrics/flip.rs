@@ -47,11 +47,13 @@ const XYZ_FROM_RGB: [[f32; 3]; 3] = [
     [2613072.0 / 12288897.0, 8788810.0 / 12288897.0, 887015.0 / 12288897.0],
     [1425312.0 / 73733382.0, 8788810.0 / 73733382.0, 70074185.0 / 73733382.0],
 ];
+#[expect(clippy::excessive_precision, reason = "digits as published")]
 const RGB_FROM_XYZ: [[f32; 3]; 3] = [
     [3.241003275, -1.537398934, -0.498615861],
     [-0.969224334, 1.875930071, 0.041554224],
     [0.055639423, -0.204011202, 1.057148933],
 ];
+#[expect(clippy::excessive_precision, reason = "digits as published")]
 const WHITE: [f32; 3] = [0.950428545, 1.0, 1.088900371];
 
 /// FLIP of every pixel of two linear images on a display, 0 (no difference) to 1. Light is clipped to 0..1; `pixels_per_degree` says how
@@ -294,7 +296,8 @@ fn feature(pixels_per_degree: f32) -> [Vec<f32>; 3] {
 mod tests {
     use super::*;
 
-    const MAPS: [fn(&Image, &Image, f32) -> Result<Plane, ImageError>; 2] = [flip_map, hdr_flip_map];
+    type Map = fn(&Image, &Image, f32) -> Result<Plane, ImageError>;
+    const MAPS: [Map; 2] = [flip_map, hdr_flip_map];
 
     fn ball(gain: f32) -> Image {
         Image::from_fn(40, 32, |x, y| {
