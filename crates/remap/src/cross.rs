@@ -25,7 +25,7 @@ use crate::probe::Noise;
 use crate::stage::LIGHTS;
 use crate::strategy::Matched;
 use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
-use crate::synthesis::{Pictures as Planar, Syntheses};
+use crate::synthesis::{LabPictures, Syntheses};
 use crate::{Entry, Plan, RemapError, Stage};
 
 /// Names of the reference scene under its lights, point and environment.
@@ -349,14 +349,14 @@ impl CrossStage {
     }
 
     /// The pictures of a look, weighted per pixel: specular and perhaps diffuse ones under both lights.
-    pub(crate) fn pictures(&self, look: &Look, with_diffuse: bool) -> Planar {
+    pub(crate) fn pictures(&self, look: &Look, with_diffuse: bool) -> LabPictures {
         let diffuse = look.diffuse.as_ref().filter(|_| with_diffuse).map(|diffuse| &diffuse.images);
         let images = look.specular.iter().chain(diffuse.into_iter().flatten());
         images.map(|image| self.weighted(image.planes())).collect()
     }
 
     /// The pictures of a look between two others.
-    pub(crate) fn mixed_pictures(&self, a: &Look, b: &Look, share: f64, with_diffuse: bool) -> Planar {
+    pub(crate) fn mixed_pictures(&self, a: &Look, b: &Look, share: f64, with_diffuse: bool) -> LabPictures {
         let diffuse = a.diffuse.as_ref().zip(b.diffuse.as_ref()).filter(|_| with_diffuse);
         let diffuse = diffuse.map(|(a, b)| a.images.iter().zip(&b.images));
         let pairs = a.specular.iter().zip(&b.specular).chain(diffuse.into_iter().flatten());

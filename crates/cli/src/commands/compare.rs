@@ -8,9 +8,9 @@ use lookmatch_rendering::{Illumination, Part, Renderer, Scene};
 use serde_json::json;
 
 use crate::args::CompareArgs;
-use crate::commands::{create_folder, lit_scene, material};
+use crate::commands::{create_folder, interruption, lit_scene, material};
 use crate::output::{print, print_json, score, spinner, table};
-use crate::renderers::{Renderers, interruption, plain_scene, renderer_of};
+use crate::renderers::{Renderers, plain_scene, renderer_of};
 use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
