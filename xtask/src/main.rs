@@ -16,7 +16,7 @@ Commands:
 Exit codes: 0 all is well, 1 a step failed, 2 the command line is wrong";
 
 /// What must pass before a change goes in, quickest first.
-const STEPS: [Step; 7] = [
+const STEPS: [Step; 8] = [
     Step {
         name: "format",
         variable: None,
@@ -67,6 +67,24 @@ const STEPS: [Step; 7] = [
         files: None,
         component: None,
         program: Some("python3"),
+    },
+    // The page of a report, on a desktop's screen and on a telephone's.
+    Step {
+        name: "report",
+        variable: None,
+        arguments: &[
+            "test",
+            "--package",
+            "lookmatch-reproduce",
+            "--test",
+            "browser",
+            "--locked",
+            "--",
+            "--ignored",
+        ],
+        files: None,
+        component: None,
+        program: Some("chromium"),
     },
     RENDERERS,
 ];

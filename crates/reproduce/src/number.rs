@@ -34,17 +34,13 @@ pub(crate) fn measured(finding: &Finding) -> [String; 2] {
     [value, format!("{words} {bar}")]
 }
 
-/// Ours beside the paper's, with their ratio: "0.0101 / 0.0107 (0.94×)".
-pub(crate) fn beside(ours: f64, paper: f64) -> String {
-    let [left, right] = apart(ours, paper);
+/// Ours beside the paper's, and their ratio where there is one: "0.0101 / 0.0107", "(0.94×)".
+pub(crate) fn beside(ours: f64, paper: f64) -> (String, Option<String>) {
     let ratio = ours / paper;
-    if !ratio.is_finite() {
-        return format!("{left} / {right}");
-    }
     let short = format!("{ratio:.2}");
     // A ratio that is just above one must not look like one.
-    let ratio = if short == "1.00" && ratio != 1.0 { apart(ratio, 1.0)[0].clone() } else { short };
-    format!("{left} / {right} ({ratio}×)")
+    let ratio_text = if short == "1.00" && ratio != 1.0 { apart(ratio, 1.0)[0].clone() } else { short };
+    (apart(ours, paper).join(" / "), ratio.is_finite().then(|| format!("({ratio_text}×)")))
 }
 
 /// "8.2 s", "3 min 20 s", "1 h 12 min".
@@ -101,9 +97,13 @@ mod tests {
         assert_eq!(apart(0.010_74, 0.0107), ["0.01074", "0.01070"]);
         assert_eq!(apart(0.5, 0.5), ["0.5000", "0.5000"]);
         assert_eq!(apart(1e-9, 1.001e-9), ["1e-9", "1.001e-9"]);
-        assert_eq!(beside(0.0101, 0.0107), "0.0101 / 0.0107 (0.94×)");
-        assert_eq!(beside(0.010_701, 0.0107), "0.010701 / 0.010700 (1.0001×)");
-        assert_eq!(beside(0.0107, 0.0), "0.0107 / 0");
+        let both = |ours, paper| {
+            let (pair, ratio) = beside(ours, paper);
+            format!("{pair} {}", ratio.unwrap_or_default())
+        };
+        assert_eq!(both(0.0101, 0.0107), "0.0101 / 0.0107 (0.94×)");
+        assert_eq!(both(0.010_701, 0.0107), "0.010701 / 0.010700 (1.0001×)");
+        assert_eq!(both(0.0107, 0.0), "0.0107 / 0 ");
         let finding = Finding { name: "share".into(), value: 0.559_99, bar: Bar::AtLeast(0.56), cause: None };
         assert_eq!(measured(&finding), ["0.55999", "at least 0.56000"]);
     }

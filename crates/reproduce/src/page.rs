@@ -170,7 +170,9 @@ fn figure(figure: &Figure, folder: &Path) -> anyhow::Result<Markup> {
         section {
             h3 { (figure.title) }
             figure.drawn {
-                img src=(embedded(folder, &figure.file)?) alt=(figure.title);
+                div.scroll tabindex="0" role="region" aria-label=(figure.title) {
+                    img src=(embedded(folder, &figure.file)?) alt=(figure.title);
+                }
                 @if !figure.about.is_empty() { figcaption { (figure.about) } }
             }
         }

@@ -125,7 +125,10 @@ fn cell(cell: &Cell) -> String {
     match cell {
         Cell::Text(text) => text.clone(),
         Cell::Number(value) => number(*value),
-        Cell::Beside { ours, paper } => beside(*ours, *paper),
+        Cell::Beside { ours, paper } => {
+            let (pair, ratio) = beside(*ours, *paper);
+            format!("{pair} {}", ratio.unwrap_or_default())
+        }
         Cell::Empty => String::new(),
     }
 }

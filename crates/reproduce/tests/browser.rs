@@ -26,6 +26,7 @@ const TELEPHONE: (u32, u32) = (390, 844);
 struct Opened {
     tab: Arc<Tab>,
     complaints: Arc<Mutex<Vec<String>>>,
+    width: u32,
     _browser: Browser,
     _example: Option<TempDir>,
 }
@@ -51,7 +52,7 @@ impl Opened {
         let complaints = Arc::new(Mutex::new(Vec::new()));
         listen(&tab, complaints.clone());
         tab.navigate_to(&format!("file://{}", page.display())).unwrap().wait_until_navigated().unwrap();
-        Self { tab, complaints, _browser: browser, _example: example }
+        Self { tab, complaints, width, _browser: browser, _example: example }
     }
 
     /// The value of an expression in the page.
@@ -101,17 +102,17 @@ impl Opened {
 
     /// What all sizes have in common.
     fn check(&self) {
-        let [scroll, inner] =
-            ["document.documentElement.scrollWidth", "innerWidth"].map(|e| self.value(e).as_u64().unwrap());
-        let wide = "[...document.querySelectorAll('main *')].filter(e => !e.closest('.scroll') && !e.closest('.hidden') && \
-                    e.getBoundingClientRect().right > innerWidth + 1).map(e => e.tagName + '.' + e.className)";
-        assert!(scroll <= inner, "the page scrolls sideways: {scroll} of {inner}; {}", self.value(wide));
-        assert_eq!(self.value(wide), json!([]));
-        let images = "Promise.all([...document.images].map(i => i.decode().then(() => i.naturalWidth > 0 && i.clientWidth > 0)))";
-        let decoded =
-            self.tab.evaluate(&format!("{images}.then(JSON.stringify)"), true).unwrap().value.unwrap();
-        let decoded: Vec<bool> = serde_json::from_str(decoded.as_str().unwrap()).unwrap();
-        assert!(decoded.len() > 4 && decoded.iter().all(|is_shown| *is_shown), "{decoded:?}");
+        // A telephone widens its window with the page: what counts is the width of its screen.
+        let width = self.width;
+        let scroll = self.value("document.documentElement.scrollWidth").as_u64().unwrap();
+        let wide = self.value(&format!(
+            "[...document.querySelectorAll('main *')].filter(e => !e.closest('.scroll') && !e.closest('.hidden') && \
+             e.getBoundingClientRect().right > {width} + 1).map(e => e.tagName + '.' + e.className)"
+        ));
+        assert!(scroll <= width.into(), "the page scrolls sideways: {scroll} of {width}; {wide}");
+        assert_eq!(wide, json!([]));
+        assert!(self.value("document.images.length").as_u64() > Some(4));
+        assert_eq!(self.broken(), json!([]));
         assert_eq!(self.value("document.querySelectorAll('.wipe[hidden]').length"), 0);
         let lost = "[...document.querySelectorAll('a')].filter(a => !document.querySelector(a.getAttribute('href'))).length";
         assert_eq!(self.value(lost), 0);
@@ -119,11 +120,35 @@ impl Opened {
         assert_eq!(self.value(nameless), 0);
     }
 
+    /// What is told of pictures that cannot be shown.
+    fn broken(&self) -> Json {
+        let shown = "i.decode().then(() => i.naturalWidth > 0 && i.clientWidth > 0 ? '' : i.alt, () => i.alt + ' is damaged')";
+        let all = format!("Promise.all([...document.images].map(i => {shown}))");
+        let told = format!("{all}.then(told => JSON.stringify(told.filter(Boolean)))");
+        let told = self.tab.evaluate(&told, true).unwrap().value.unwrap();
+        serde_json::from_str(told.as_str().unwrap()).unwrap()
+    }
+
+    /// All texts are dark or bright enough on what lies behind them, by WCAG 2.2's level AA, by day and by night.
+    fn check_contrast(&self) {
+        for scheme in ["light", "dark"] {
+            let features = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+            self.tab.call_method(command::<Emulation::SetEmulatedMedia>(features)).unwrap();
+            assert_eq!(
+                self.value(&format!("matchMedia('(prefers-color-scheme: {scheme})').matches")),
+                json!(true)
+            );
+            let [texts, faint] = [0, 1].map(|k| self.value(&format!("({CONTRAST})()[{k}]")));
+            assert!(texts.as_u64() > Some(50), "{texts} texts");
+            assert_eq!(faint, json!([]), "{scheme}");
+            self.screenshots(&format!("{scheme}-{}", self.width));
+        }
+    }
+
     fn screenshots(&self, name: &str) {
         let Some(folder) = env::var_os("LOOKMATCH_SCREENSHOTS").map(PathBuf::from) else { return };
         let height = self.value("document.documentElement.scrollHeight").as_f64().unwrap();
-        let width = self.value("innerWidth").as_f64().unwrap();
-        let clip = Page::Viewport { x: 0.0, y: 0.0, width, height, scale: 1.0 };
+        let clip = Page::Viewport { x: 0.0, y: 0.0, width: self.width.into(), height, scale: 1.0 };
         let whole = json!({"format": "png", "clip": clip, "captureBeyondViewport": true});
         let data = self.tab.call_method(command::<Page::CaptureScreenshot>(whole)).unwrap().data;
         let bytes = base64::Engine::decode(&base64::prelude::BASE64_STANDARD, data).unwrap();
@@ -139,6 +164,34 @@ impl Opened {
         assert!(complaints.is_empty(), "{complaints:#?}");
     }
 }
+
+/// How many texts there are, and those of too little contrast.
+const CONTRAST: &str = r"() => {
+    const channels = (colour) => {
+        const is_share = colour.startsWith('color(srgb');
+        const [r, g, b, a = 1] = colour.match(/\d[\d.e-]*/g).map(Number);
+        return [...[r, g, b].map((v) => (is_share ? v : v / 255)), a];
+    };
+    const luminance = (colour) => {
+        const [r, g, b] = colour.map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const behind = (element) => {
+        for (; element; element = element.parentElement) {
+            const colour = channels(getComputedStyle(element).backgroundColor);
+            if (colour[3] > 0) return colour;
+        }
+        return [1, 1, 1];
+    };
+    const has_text = (e) => [...e.childNodes].some((n) => n.nodeType === Node.TEXT_NODE && n.data.trim());
+    const texts = [...document.querySelectorAll('body *')].filter((e) => !e.closest('script, .stage') && has_text(e));
+    const faint = texts.map((e) => {
+        const [a, b] = [channels(getComputedStyle(e).color), behind(e)].map(luminance);
+        const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+        return ratio >= 4.5 ? null : `${e.tagName} '${e.textContent.slice(0, 40)}': ${ratio}`;
+    });
+    return [texts.length, faint.filter(Boolean)];
+}";
 
 /// A command to the browser: what it does not name is left to the browser.
 fn command<C: DeserializeOwned>(fields: Json) -> C {
@@ -186,7 +239,7 @@ fn listen(tab: &Tab, complaints: Arc<Mutex<Vec<String>>>) {
 fn a_desktop_shows_all_and_the_keyboard_moves_the_wipe() {
     let opened = Opened::new(DESKTOP, true);
     opened.check();
-    opened.screenshots("desktop");
+    opened.check_contrast();
     assert_eq!(opened.line(), 50.0);
     let [x, y] = opened.on_stage([0.3, 0.4]);
     opened.tab.click_point(headless_chrome::browser::tab::point::Point { x, y }).unwrap();
@@ -217,7 +270,7 @@ fn a_desktop_shows_all_and_the_keyboard_moves_the_wipe() {
 fn a_telephone_shows_all_and_a_finger_moves_the_wipe() {
     let opened = Opened::new(TELEPHONE, true);
     opened.check();
-    opened.screenshots("telephone");
+    opened.check_contrast();
     let [from, to] = [opened.on_stage([0.5, 0.5]), opened.on_stage([0.2, 0.5])];
     opened.touch("touchStart", &[from]);
     for k in 1..=4 {
@@ -235,8 +288,7 @@ fn a_telephone_shows_all_and_a_finger_moves_the_wipe() {
 fn without_its_script_all_pictures_are_shown() {
     let opened = Opened::new(DESKTOP, false);
     assert_eq!(opened.value("document.querySelectorAll('.stage img').length"), 0);
-    let shown = "[...document.images].every(i => i.naturalWidth > 0 && i.clientWidth > 0)";
-    assert_eq!(opened.value(shown), json!(true));
+    assert_eq!(opened.broken(), json!([]));
     assert!(opened.value("document.images.length").as_u64() > Some(4));
     opened.finish();
 }

@@ -76,7 +76,7 @@ fn what_is_higher_than_the_papers_is_red_and_nothing_else() {
             Table { rows: vec![row(ours, paper)], columns: vec!["".into(), "".into()], ..Table::default() };
         let report = Report { name: "x".into(), tables: vec![table], ..Report::default() };
         let page = page(&Run { reports: vec![report], ..run() }, folder.path()).unwrap();
-        page.contains("<td class=\"number worse\">")
+        page.contains("<td class=\"number beside worse\">")
     };
     assert!(marked(0.010_700_1, 0.0107) && marked(1.0, 0.0));
     assert!(!marked(0.0107, 0.0107) && !marked(0.0106, 0.0107));
@@ -182,7 +182,8 @@ fn what_is_done_is_kept_for_the_same_run_and_no_other() {
     elsewhere.environment.machine = "another".into();
     elsewhere.environment.command = "lookmatch reproduce ward-to-ggx".into();
     assert_eq!(resumed(&folder, &elsewhere).0, Some(ward()));
-    let changes: [(fn(&mut Run), &str); 3] = [
+    type Change = fn(&mut Run);
+    let changes: [(Change, &str); 3] = [
         (
             |run| run.environment.program = "lookmatch 0.2.0".into(),
             "lookmatch 0.1.0, seed 7, quick, not of lookmatch 0.2.0",

@@ -83,7 +83,7 @@ fn caption(picture: &Picture) -> Markup {
     html! {
         figcaption {
             b { (picture.title) }
-            code { (picture.material) }
+            code { @for part in picture.material.split_inclusive([',', ':', '/']) { (part) wbr; } }
             @if let Some(verdict) = picture.verdict { (label(verdict)) }
             @if picture.nrmsd.is_some() || picture.jod.is_some() {
                 dl.scores {

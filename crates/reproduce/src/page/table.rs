@@ -48,7 +48,10 @@ fn cell(cell: &Cell) -> Markup {
         @match cell {
             Cell::Text(text) => td.words { (text) },
             Cell::Number(value) => td.number { (number(*value)) },
-            Cell::Beside { ours, paper } => td.number.worse[ours > paper] { (beside(*ours, *paper)) },
+            Cell::Beside { ours, paper } => {
+                @let (pair, ratio) = beside(*ours, *paper);
+                td.number.beside.worse[ours > paper] { span { (pair) } @if let Some(ratio) = ratio { " " span { (ratio) } } }
+            }
             Cell::Empty => td {},
         }
     }
