@@ -51,6 +51,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Judge a probe in a scene that its search never saw
     Validate(ValidateArgs),
+    /// Run the paper's experiments, and write a report with its figures beside ours
+    Reproduce(ReproduceArgs),
     /// Measure speed and accuracy on this machine, alone or beside another renderer
     Bench(BenchArgs),
     /// List, verify or shrink the database of other renderers' pictures
@@ -349,6 +351,23 @@ pub(crate) struct CompareArgs {
     /// Folder for the pictures and the numbers
     #[arg(short, long, required_unless_present = "pictures")]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) json: Json,
+}
+
+#[derive(Args)]
+pub(crate) struct ReproduceArgs {
+    /// An experiment, or all; without one, they are listed
+    pub(crate) name: Option<String>,
+    /// Everything small: fewer materials, smaller pictures
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Seed of all random decisions
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Folder of the report; a run that was stopped goes on where it was
+    #[arg(short, long, default_value = "report")]
+    pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) json: Json,
 }

@@ -17,8 +17,6 @@ mod write;
 pub use experiment::{Experiment, Setting, Watch};
 pub use experiments::{by_name, experiments};
 pub use page::page;
-pub use report::{
-    Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table,
-};
+pub use report::{Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table};
 pub use text::text;
 pub use write::{keep, kept, pictures, write};

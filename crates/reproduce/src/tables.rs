@@ -10,7 +10,12 @@ pub(crate) type Published = [[f64; 3]; 4];
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// NRMSD over the source points beside what was published.
-pub(crate) fn nrmsd_table(title: &str, about: &str, ours: &[Statistics; 3], paper: Option<&Published>) -> Table {
+pub(crate) fn nrmsd_table(
+    title: &str,
+    about: &str,
+    ours: &[Statistics; 3],
+    paper: Option<&Published>,
+) -> Table {
     let values = |pick: fn(&Statistics) -> f64| ours.each_ref().map(pick);
     let rows = [
         ("min", values(|s| s.min)),
@@ -32,9 +37,21 @@ pub(crate) fn nrmsd_table(title: &str, about: &str, ours: &[Statistics; 3], pape
 }
 
 /// One bar per channel: a mean at or below the published one.
-pub(crate) fn nrmsd_bars(table: &str, ours: &[Statistics; 3], paper: &Published, cause: &str) -> Vec<Finding> {
+pub(crate) fn nrmsd_bars(
+    table: &str,
+    ours: &[Statistics; 3],
+    paper: &Published,
+    cause: &str,
+) -> Vec<Finding> {
     (0..3)
-        .map(|c| bar(format!("{table}: mean NRMSD, {}", CHANNELS[c]), ours[c].mean, Bar::AtMost(paper[2][c]), cause))
+        .map(|c| {
+            bar(
+                format!("{table}: mean NRMSD, {}", CHANNELS[c]),
+                ours[c].mean,
+                Bar::AtMost(paper[2][c]),
+                cause,
+            )
+        })
         .collect()
 }
 

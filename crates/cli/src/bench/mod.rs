@@ -6,7 +6,7 @@
 pub(crate) mod accuracy;
 pub(crate) mod catalogue;
 pub(crate) mod document;
-mod machine;
+pub(crate) mod machine;
 mod materials;
 pub(crate) mod peer;
 mod stage;

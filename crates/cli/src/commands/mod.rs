@@ -20,6 +20,7 @@ pub(crate) mod pairs;
 pub(crate) mod remap;
 pub(crate) mod render;
 pub(crate) mod renderers;
+pub(crate) mod reproduce;
 pub(crate) mod scene;
 pub(crate) mod validate;
 

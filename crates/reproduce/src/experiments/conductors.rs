@@ -14,27 +14,24 @@ use crate::tables::{Published, bar, mean, nrmsd_bars, nrmsd_table};
 use crate::{Bar, Cell, Figure, Report, Row, Setting, Table, Watch};
 
 /// Table 2, left.
-const TO_BECKMANN: Published = [
-    [0.0054, 0.0046, 0.0043],
-    [0.0305, 0.0320, 0.0329],
-    [0.0107, 0.0103, 0.0100],
-    [0.0078, 0.0084, 0.0087],
-];
+const TO_BECKMANN: Published =
+    [[0.0054, 0.0046, 0.0043], [0.0305, 0.0320, 0.0329], [0.0107, 0.0103, 0.0100], [0.0078, 0.0084, 0.0087]];
 /// Table 2, right.
-const TO_GGX: Published = [
-    [0.0166, 0.0154, 0.0123],
-    [0.0546, 0.0483, 0.0404],
-    [0.0247, 0.0259, 0.0278],
-    [0.0097, 0.0076, 0.0059],
-];
+const TO_GGX: Published =
+    [[0.0166, 0.0154, 0.0123], [0.0546, 0.0483, 0.0404], [0.0247, 0.0259, 0.0278], [0.0097, 0.0076, 0.0059]];
 /// The metals of the three spheres.
 const METALS: [&str; 3] = ["gold", "silver", "copper"];
 /// Roughnesses that are pictured.
 const PICTURED: [f64; 3] = [0.1, 0.3, 0.6];
 
 pub(super) fn to_beckmann(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report> {
-    Case { name: "as-to-beckmann", target: "beckmann-conductor", title: "Ashikhmin-Shirley to Cook-Torrance", paper: TO_BECKMANN }
-        .run(setting, watch)
+    Case {
+        name: "as-to-beckmann",
+        target: "beckmann-conductor",
+        title: "Ashikhmin-Shirley to Cook-Torrance",
+        paper: TO_BECKMANN,
+    }
+    .run(setting, watch)
 }
 
 pub(super) fn to_ggx(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report> {
@@ -71,7 +68,8 @@ impl Case {
     fn run(&self, setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report> {
         let model = lookmatch_materials::by_name;
         let options = Options { seed: setting.seed, quick: setting.is_quick, ..Options::default() };
-        let plan = Plan::between(Endpoint::Model(model("as")?), Endpoint::Model(model(self.target)?), &options)?;
+        let plan =
+            Plan::between(Endpoint::Model(model("as")?), Endpoint::Model(model(self.target)?), &options)?;
         let probe = found(setting, watch, self.name, &plan)?.probe;
 
         let size = if setting.is_quick { 128 } else { 300 };
@@ -135,7 +133,12 @@ impl Case {
         })
     }
 
-    fn comparisons(&self, album: &Album, renderer: &Renderer, probe: &Probe) -> anyhow::Result<Vec<crate::Comparison>> {
+    fn comparisons(
+        &self,
+        album: &Album,
+        renderer: &Renderer,
+        probe: &Probe,
+    ) -> anyhow::Result<Vec<crate::Comparison>> {
         let nearest = |wanted: &f64| {
             let off = |e: &lookmatch_remap::Entry| (e.source[0] - wanted).abs();
             probe.entries.iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("a probe has entries")
@@ -150,7 +153,13 @@ impl Case {
             let others =
                 [shown("probe", self.target, entry.target[0])?, shown("copy", self.target, entry.source[0])?];
             let title = format!("Gold, silver and copper, roughness {}", entry.source[0]);
-            comparisons.push(album.compare(&format!("metals-{k}"), title, &source, &others, renderer.mask())?);
+            comparisons.push(album.compare(
+                &format!("metals-{k}"),
+                title,
+                &source,
+                &others,
+                renderer.mask(),
+            )?);
         }
         // Figure 8: the metal that the map was found on.
         let entry = nearest(&PICTURED[1]);
@@ -167,7 +176,13 @@ impl Case {
         Ok(comparisons)
     }
 
-    fn figure(&self, album: &Album, probe: &Probe, taken: &[[f64; 3]], best: &[f64]) -> anyhow::Result<Figure> {
+    fn figure(
+        &self,
+        album: &Album,
+        probe: &Probe,
+        taken: &[[f64; 3]],
+        best: &[f64],
+    ) -> anyhow::Result<Figure> {
         let over = |name: &str, values: Vec<f64>| Series {
             name: name.into(),
             points: probe.entries.iter().zip(values).map(|(e, v)| (e.source[0], v)).collect(),

@@ -17,26 +17,23 @@ use crate::{Bar, Cell, Comparison, Figure, Finding, Report, Row, Setting, Table,
 
 const NAME: &str = "ward-to-ggx";
 /// Table 4, top.
-const UNCONSTRAINED: Published = [
-    [0.0105, 0.0133, 0.0114],
-    [0.0323, 0.0374, 0.0440],
-    [0.0182, 0.0222, 0.0262],
-    [0.0059, 0.0068, 0.0097],
-];
+const UNCONSTRAINED: Published =
+    [[0.0105, 0.0133, 0.0114], [0.0323, 0.0374, 0.0440], [0.0182, 0.0222, 0.0262], [0.0059, 0.0068, 0.0097]];
 /// Table 4, bottom.
-const CONSTRAINED: Published = [
-    [0.0113, 0.0144, 0.0114],
-    [0.0306, 0.0366, 0.0440],
-    [0.0187, 0.0230, 0.0268],
-    [0.0056, 0.0067, 0.0102],
-];
+const CONSTRAINED: Published =
+    [[0.0113, 0.0144, 0.0114], [0.0306, 0.0366, 0.0440], [0.0187, 0.0230, 0.0268], [0.0056, 0.0067, 0.0102]];
 /// Roughnesses of Figure 9, at a specular reflectance in the middle of the range.
 const PICTURED: [[f64; 2]; 2] = [[0.2, 0.31], [0.2, 0.01]];
 /// Targets that are rendered at once where all are.
 const BATCH: usize = 64;
 
 /// The plan of one of its probes.
-pub(super) fn plan(setting: &Setting, strategy: Strategy, preset: Option<Preset>, search: &str) -> anyhow::Result<Plan> {
+pub(super) fn plan(
+    setting: &Setting,
+    strategy: Strategy,
+    preset: Option<Preset>,
+    search: &str,
+) -> anyhow::Result<Plan> {
     let [ward, ggx] = ["ward", "ggx"].map(lookmatch_materials::by_name);
     let options = Options {
         seed: setting.seed,
@@ -87,8 +84,18 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
         ),
         findings,
         tables: vec![
-            nrmsd_table("Table 4, unconstrained", "Whole pictures, index up to 1.85.", &alone_whole, Some(&UNCONSTRAINED)),
-            nrmsd_table("Table 4, constrained", "Whole pictures, index up to 1.85.", &led_whole, Some(&CONSTRAINED)),
+            nrmsd_table(
+                "Table 4, unconstrained",
+                "Whole pictures, index up to 1.85.",
+                &alone_whole,
+                Some(&UNCONSTRAINED),
+            ),
+            nrmsd_table(
+                "Table 4, constrained",
+                "Whole pictures, index up to 1.85.",
+                &led_whole,
+                Some(&CONSTRAINED),
+            ),
             baselines(&free_scores),
             run_times(&brute, &alone, &led),
             gap.table(),
@@ -131,7 +138,8 @@ fn better_than_baselines(scores: &ValidationReport) -> Finding {
 /// What people do without a probe, beside it.
 fn baselines(scores: &ValidationReport) -> Table {
     let verdicts = |method: &MethodScores| {
-        let counts = method.verdicts.map(|v| [v.indistinguishable, v.slightly_different, v.noticeably_different]);
+        let counts =
+            method.verdicts.map(|v| [v.indistinguishable, v.slightly_different, v.noticeably_different]);
         counts.unwrap_or_default().map(|count| Cell::Text(count.to_string()))
     };
     let row = |method: &MethodScores| {
@@ -140,7 +148,8 @@ fn baselines(scores: &ValidationReport) -> Table {
         cells.extend(verdicts(method));
         Row { name: method.method.clone(), cells, is_main: method.method == "probe" }
     };
-    let columns = ["", "NRMSD", "masked NRMSD", "indistinguishable", "slightly different", "noticeably different"];
+    let columns =
+        ["", "NRMSD", "masked NRMSD", "indistinguishable", "slightly different", "noticeably different"];
     Table {
         title: "Beside what people do without a probe".into(),
         about: format!(
