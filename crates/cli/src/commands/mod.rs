@@ -5,6 +5,7 @@ pub(crate) mod apply_textures;
 pub(crate) mod bench;
 pub(crate) mod cache;
 pub(crate) mod compare;
+pub(crate) mod compare_pictures;
 pub(crate) mod compose;
 pub(crate) mod cross;
 pub(crate) mod eval;
