@@ -541,6 +541,8 @@ fn materialx_documents_are_valid_and_agree() {
     let three = three.concat();
     for (models, more, colour, shader) in [
         (["ward", "ggx"], &[][..], Some("diffuse"), None),
+        // A searched colour, of which nothing but its hue depends on the source.
+        (["ward", "ggx"], &["--vary", "target.diffuse=0.2:0.6:0.2"], Some("diffuse"), None),
         (["ashikhmin-shirley", "ggx"], &three, Some("diffuse"), None),
         (["ashikhmin-shirley", "beckmann-conductor"], &[], None, None),
         (["ward", "standard-surface"], &[], Some("diffuse"), Some("standard_surface")),

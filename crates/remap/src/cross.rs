@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd, nrmsd_of_noise};
+use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, inner_product, nrmsd, nrmsd_of_noise};
 use lookmatch_materials::{BlackBody, Material, Role};
 use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
 use lookmatch_search::Problem;
@@ -350,9 +350,16 @@ impl CrossStage {
 
     /// The pictures of a look, weighted per pixel: specular and perhaps diffuse ones under both lights.
     pub(crate) fn pictures(&self, look: &Look, with_diffuse: bool) -> LabPictures {
-        let diffuse = look.diffuse.as_ref().filter(|_| with_diffuse).map(|diffuse| &diffuse.images);
-        let images = look.specular.iter().chain(diffuse.into_iter().flatten());
-        images.map(|image| self.weighted(image.planes())).collect()
+        shown(look, with_diffuse).map(|image| self.weighted(image.planes())).collect()
+    }
+
+    /// Squared length of the noise in each of the pictures of a look.
+    pub(crate) fn noise(&self, look: &Look, with_diffuse: bool) -> Vec<f64> {
+        let squared = |image: &NoisyLab| {
+            let noise = self.weighted(image.noise(&self.around));
+            inner_product(&noise, &noise)
+        };
+        shown(look, with_diffuse).map(squared).collect()
     }
 
     /// The pictures of a look between two others.
@@ -408,6 +415,12 @@ impl CrossStage {
         }
         Score { value, error: variance.sqrt() }
     }
+}
+
+/// What is compared of a look: specular and perhaps diffuse pictures under both lights.
+fn shown(look: &Look, with_diffuse: bool) -> impl Iterator<Item = &NoisyLab> {
+    let diffuse = look.diffuse.as_ref().filter(|_| with_diffuse).map(|diffuse| &diffuse.images);
+    look.specular.iter().chain(diffuse.into_iter().flatten())
 }
 
 impl Look {

@@ -25,6 +25,8 @@ use interpolation::{Interpolation, Metric};
 
 /// Fitness that the components may leave out of the pictures that they are made of, as root mean square.
 const LEFT_OUT: f64 = 0.01;
+/// Length of noise, in multiples of its measured one, that is left out as well: a little more than there is on average.
+const NOISES: f64 = 1.2;
 /// Points with a switch of their own that need a function of their own, at least.
 const FEWEST: usize = 6;
 /// Levels between the ends of an axis in which the model is linear.
@@ -151,6 +153,8 @@ pub(crate) type LabPictures = Vec<Vec<f32>>;
 pub(crate) struct Rendered {
     pub(crate) point: Point,
     pub(crate) pictures: LabPictures,
+    /// Squared length of the noise in each: no component is to hold it.
+    pub(crate) noise: Vec<f64>,
 }
 
 /// Makes the pictures of a material between two rendered ones: their places, and the share of the second.
@@ -252,24 +256,28 @@ impl Synthesis {
             let kind = |kind: usize| {
                 let pictures = rendered.iter().map(|r| &r.pictures).chain(&mixed);
                 let samples: Vec<&[f32]> = pictures.map(|pictures| &*pictures[kind]).collect();
-                Components::of(&samples, self.tolerance(kind))
+                let noise = rendered.iter().map(|r| r.noise[kind]).sum::<f64>() / rendered.len() as f64;
+                Components::of(&samples, self.tolerance(kind, noise))
             };
             self.components = (0..self.shares.len()).map(kind).collect();
         }
         // Whole batches are what a synthesis starts from; candidates come one by one, and were foreseen.
         let error = if let [one] = rendered { self.error(&one.point, &one.pictures) } else { None };
         self.errors.extend(error);
-        for Rendered { point, pictures } in rendered {
+        for Rendered { point, pictures, noise } in rendered {
             self.learnt.insert(point.clone());
-            self.add(point, pictures, error);
+            self.add(point, (pictures, noise), error);
         }
-        for ((_, _, _, point), pictures) in between.iter().zip(&mixed) {
-            self.add(point, pictures, None);
+        for ((a, b, _, point), pictures) in between.iter().zip(&mixed) {
+            let ends = rendered[*a].noise.iter().zip(&rendered[*b].noise);
+            let noise: Vec<f64> = ends.map(|(a, b)| a.max(*b)).collect();
+            self.add(point, (pictures, &noise), None);
         }
     }
 
-    fn tolerance(&self, kind: usize) -> f64 {
-        LEFT_OUT / self.shares[kind].max(1e-12)
+    /// Length that components may leave of a picture with noise of a squared length.
+    fn tolerance(&self, kind: usize, noise: f64) -> f64 {
+        (LEFT_OUT / self.shares[kind].max(1e-12)).hypot(NOISES * noise.sqrt())
     }
 
     /// Between which of some rendered pictures others follow: their places, the share of the second, and the point.
@@ -306,8 +314,9 @@ impl Synthesis {
         self.distances(&seen, std::slice::from_ref(point)).map(|distances| distances[0])
     }
 
-    fn add(&mut self, point: &Point, pictures: &LabPictures, error: Option<f64>) {
-        let tolerances: Vec<f64> = (0..self.shares.len()).map(|kind| self.tolerance(kind)).collect();
+    fn add(&mut self, point: &Point, (pictures, noise): (&LabPictures, &[f64]), error: Option<f64>) {
+        let tolerances: Vec<f64> =
+            noise.iter().enumerate().map(|(kind, v)| self.tolerance(kind, *v)).collect();
         let kinds = self.components.iter_mut().zip(pictures).zip(tolerances);
         let loadings: Vec<Vec<f64>> = kinds.map(|((c, p), t)| c.extended(p, t).values).collect();
         let place = self.place(point);
