@@ -3,8 +3,11 @@
 use crate::scene::up;
 use crate::{Camera, EnvironmentLight, Mesh, Plane, PointLight, Scene, Sphere};
 
+/// A name and what it makes.
+type BuiltIn = (&'static str, fn() -> Scene);
+
 /// Scenes by name.
-pub(crate) const BUILT_IN: [(&str, fn() -> Scene); 6] = [
+pub(crate) const BUILT_IN: [BuiltIn; 6] = [
     ("reference", Scene::reference),
     ("spheres", Scene::spheres),
     ("blobs", Scene::blobs),
@@ -71,7 +74,7 @@ impl Scene {
             meshes: vec![mesh("square", [0.0; 3], 3.6)],
             plane: None,
             // Soft light from all around, of about the same colour everywhere.
-            environment: Some(EnvironmentLight { scale: 3.4, ..EnvironmentLight::of("studio") }),
+            environment: Some(EnvironmentLight { scale: 2.9, ..EnvironmentLight::of("studio") }),
             ..Self::blobs()
         }
     }
