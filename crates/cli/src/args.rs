@@ -47,7 +47,7 @@ pub(crate) enum Command {
     Compose(ComposeArgs),
     /// Write a probe as a shader, a node graph, a look-up table or a script
     Export(ExportArgs),
-    /// Render two materials side by side and measure their difference
+    /// Measure the difference of two materials, rendered side by side, or of two pictures, and say whether anybody would see it
     Compare(CompareArgs),
     /// Judge a probe in a scene that its search never saw
     Validate(ValidateArgs),
@@ -319,12 +319,19 @@ pub(crate) struct CrossArgs {
 
 #[derive(Args)]
 pub(crate) struct CompareArgs {
+    /// Two pictures (.exr, .hdr) instead of materials: what it should look like, and what should look like it
+    #[arg(num_args = 2, value_names = ["SOURCE", "TARGET"], conflicts_with_all = ["source", "target", "scene", "light", "size", "samples"])]
+    pub(crate) pictures: Vec<PathBuf>,
+    /// What counts of the pictures: disc (the largest in their middle), CX,CY,R (a disc, in pixels), or a picture (.exr, .hdr; white counts
+    /// in full). Discs fade outwards, as the paper's mask does
+    #[arg(long)]
+    pub(crate) mask: Option<String>,
     /// The material to look like
-    #[arg(long)]
-    pub(crate) source: String,
+    #[arg(long, required_unless_present = "pictures")]
+    pub(crate) source: Option<String>,
     /// The material that should look like it
-    #[arg(long)]
-    pub(crate) target: String,
+    #[arg(long, required_unless_present = "pictures")]
+    pub(crate) target: Option<String>,
     /// reference, spheres, or a scene file (.toml)
     #[arg(long, default_value = "spheres")]
     pub(crate) scene: String,
@@ -340,8 +347,8 @@ pub(crate) struct CompareArgs {
     #[command(flatten)]
     pub(crate) renderers: RendererArgs,
     /// Folder for the pictures and the numbers
-    #[arg(short, long)]
-    pub(crate) output: PathBuf,
+    #[arg(short, long, required_unless_present = "pictures")]
+    pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) json: Json,
 }
@@ -356,6 +363,10 @@ pub(crate) struct ValidateArgs {
     /// Number of source points, evenly spread; all of the probe's if not given
     #[arg(long)]
     pub(crate) points: Option<usize>,
+    /// Number of them, evenly spread, that are also judged by the metrics of the eye, which take a quarter of a second a pair: a
+    /// number, or all
+    #[arg(long, value_name = "COUNT", default_value = "48", value_parser = metric_points)]
+    pub(crate) metric_points: usize,
     /// Side of the pictures in pixels
     #[arg(long, default_value_t = 300)]
     pub(crate) size: usize,
@@ -400,6 +411,13 @@ fn renderer_command(text: &str) -> Result<(String, String), String> {
         return Err(format!("the name '{name}' may have lower case letters, digits and hyphens"));
     }
     Ok((name.to_owned(), command.to_owned()))
+}
+
+fn metric_points(text: &str) -> Result<usize, String> {
+    match text {
+        "all" => Ok(usize::MAX),
+        _ => text.parse().map_err(|_| "expected a number of points, 0 for none, or all".to_owned()),
+    }
 }
 
 /// Splits `source.name` or `target.name` from its side.

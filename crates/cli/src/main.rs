@@ -6,6 +6,7 @@
 mod args;
 mod bench;
 mod commands;
+mod judgement;
 mod output;
 mod plot;
 mod renderers;

@@ -21,14 +21,6 @@ use crate::args::RendererArgs;
 use crate::output::spinner;
 use crate::transport::renders;
 
-/// A flag that Ctrl-C raises. Asked for once, by commands that end their work in order.
-pub(crate) fn interruption() -> anyhow::Result<Arc<AtomicBool>> {
-    let stopped = Arc::new(AtomicBool::new(false));
-    let flag = stopped.clone();
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
-    Ok(stopped)
-}
-
 /// The renderer that a material's text names, `RENDERER:MODEL…`; `None` for ours.
 pub(crate) fn renderer_of(text: &str) -> Option<String> {
     let json = match text.trim_start().starts_with('{') {

@@ -23,7 +23,7 @@ const PICTURED: [f64; 2] = [0.2, 0.75];
 /// Validates a probe and writes `index.html`, `validation.json`, `validation.txt` and the pictures.
 pub(crate) fn write(probe: &Probe, folder: &Path) -> anyhow::Result<ValidationReport> {
     let validator = prepared(probe, &None, SIZE)?;
-    let validation = with_progress(&validator, &validation_points(probe, None))?;
+    let validation = with_progress(&validator, &validation_points(probe, None), 0)?;
     let text = scores_table(&validation);
     let file =
         |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));

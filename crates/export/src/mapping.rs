@@ -118,6 +118,11 @@ impl Mapping {
         self.outputs.iter().map(|o| identifier(&format!("{prefix}{}", o.name))).collect()
     }
 
+    /// The inputs that a function reads, as files call them.
+    pub(crate) fn arguments(&self, function: &Function) -> Vec<String> {
+        function.arguments.iter().map(|a| identifier(&self.inputs[a.input].name)).collect()
+    }
+
     /// Whether a function reads a coloured input, so that it has a value for each channel.
     pub(crate) fn by_channel(&self, function: &Function) -> bool {
         function.arguments.iter().any(|a| self.inputs[a.input].is_colour)

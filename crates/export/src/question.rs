@@ -1,8 +1,9 @@
 //! Asking `apply`, once for each point.
 
 use std::collections::HashMap;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
+use itertools::Itertools;
 use lookmatch_materials::{Material, Value};
 use lookmatch_remap::{Probe, RemapError, apply, apply_smoothly};
 use rayon::prelude::*;
@@ -68,11 +69,11 @@ impl<'a> Question<'a> {
 
     pub(crate) fn ask(&self, point: &Point) -> Result<Answer, ExportError> {
         let key: Vec<u64> = point.iter().flatten().map(|v| v.to_bits()).collect();
-        if let Some(answer) = self.known.lock().expect("no thread panicked").get(&key) {
+        if let Some(answer) = self.known.lock().unwrap_or_else(PoisonError::into_inner).get(&key) {
             return Ok(answer.clone());
         }
         let answer = self.apply(point)?;
-        self.known.lock().expect("no thread panicked").insert(key, answer.clone());
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(key, answer.clone());
         Ok(answer)
     }
 
@@ -93,28 +94,14 @@ impl<'a> Question<'a> {
         }
         let apply = if self.is_smooth { apply_smoothly } else { apply };
         match apply(self.probe, &source, false) {
-            Ok(applied) => Ok(Some(applied.target.values().iter().map(numbers).collect())),
+            Ok(applied) => Ok(Some(applied.target.values().iter().map(Value::numbers).collect())),
             Err(RemapError::Option(_)) if self.probe.entries.iter().any(|e| e.failed.is_some()) => Ok(None),
             Err(error) => Err(error.into()),
         }
     }
 }
 
-/// The numbers of a value; none for a choice or a file.
-pub(crate) fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Number(v) => vec![*v],
-        Value::Colour(c) => c.to_vec(),
-        Value::List(v) => v.to_vec(),
-        Value::Choice(_) | Value::File(_) => Vec::new(),
-    }
-}
-
 /// The points of a grid, the first axis slowest.
 pub(crate) fn grid(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    levels.iter().fold(vec![Vec::new()], |points, levels| {
-        let longer =
-            |point: Vec<f64>| levels.iter().map(move |l| [&point[..], &[*l]].concat()).collect::<Vec<_>>();
-        points.into_iter().flat_map(longer).collect()
-    })
+    levels.iter().map(|levels| levels.iter().copied()).multi_cartesian_product().collect()
 }

@@ -1,7 +1,7 @@
 //! What a comparison of two materials costs (four pairs of 300 x 300 images), beside copying the same bytes.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use lookmatch_imaging::{Columns, Image, lab_planes, squared_distance};
+use lookmatch_imaging::{Columns, Image, METRICS, Mask, distance_correlation, lab_planes, squared_distance};
 use std::hint::black_box;
 
 const SIZE: usize = 300;
@@ -56,5 +56,39 @@ fn products(criterion: &mut Criterion) {
     });
 }
 
+/// Every metric of a pair of pictures of a ball with a highlight of 50, whole and masked.
+fn pictures(criterion: &mut Criterion) {
+    let ball = |gain: f32| {
+        Image::from_fn(SIZE, SIZE, |x, y| {
+            let r = (x as f32 - 150.0).hypot(y as f32 - 150.0);
+            let checker = if (x / 20 + y / 20) % 2 == 0 { 0.6 } else { 0.2 };
+            match r {
+                ..6.0 => [50.0 * gain; 3],
+                ..120.0 => [gain * (1.0 - r / 150.0), 0.3 * gain, 0.2],
+                _ => [checker; 3],
+            }
+        })
+    };
+    let (source, target) = (ball(1.0), ball(1.1));
+    let mask = Mask::disc(SIZE, SIZE, 150.0, 150.0, 120.0);
+    for metric in METRICS {
+        for (title, mask) in [("whole", None), ("whole and masked", Some(&mask))] {
+            criterion.bench_function(&format!("{} of a pair of 300x300, {title}", metric.name), |bencher| {
+                bencher.iter(|| metric.read(black_box(&source), black_box(&target), mask).unwrap());
+            });
+        }
+    }
+    let numbers = |k: usize| (0..1000).map(|i| ((i * k) % 997) as f64).collect::<Vec<f64>>();
+    let (x, y) = (numbers(31), numbers(57));
+    criterion.bench_function("distance correlation of 1000 numbers", |bencher| {
+        bencher.iter(|| distance_correlation(black_box(&x), black_box(&y)).unwrap());
+    });
+}
+
+criterion_group! {
+    name = of_pictures;
+    config = Criterion::default().sample_size(10);
+    targets = pictures
+}
 criterion_group!(benches, metric, products);
-criterion_main!(benches);
+criterion_main!(benches, of_pictures);

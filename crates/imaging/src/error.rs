@@ -131,6 +131,47 @@ pub enum ImageError {
         /// The value found.
         value: f64,
     },
+    /// A picture that is to be judged has a pixel that is NaN or infinite.
+    #[error(
+        "{value} in channel {channel} of pixel x = {x}, y = {y} (first of its kind, counted from the top left); \
+         only finite values can be compared"
+    )]
+    Unjudgeable {
+        /// Column, 0 at the left.
+        x: usize,
+        /// Row, 0 at the top.
+        y: usize,
+        /// `R`, `G` or `B`.
+        channel: char,
+        /// NaN or an infinity.
+        value: f32,
+    },
+    /// A metric's neighbourhood does not fit into the picture.
+    #[error("{metric} needs pictures of at least {least} x {least} pixels; given were {width} x {height}")]
+    TooSmall {
+        /// The metric.
+        metric: &'static str,
+        /// Fewest pixels a side.
+        least: usize,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+    },
+    /// A mask leaves nothing to average over.
+    #[error("the mask has weight 0 at every pixel that counts; at least one must be positive")]
+    EmptyMask,
+    /// Two lists of numbers cannot be correlated.
+    #[error(
+        "{count} and {other_count} numbers cannot be correlated: both lists need the same length, at least 2, \
+         and finite numbers"
+    )]
+    Uncorrelated {
+        /// Length of the first list.
+        count: usize,
+        /// Length of the second list.
+        other_count: usize,
+    },
     /// NRMSD divides by a range that is 0 although the images differ.
     #[error(
         "NRMSD of channel {channel} is not defined: every source pixel has the value {value}, so there is no \

@@ -61,7 +61,7 @@ fn visible(distance: f64) -> f32 {
 }
 
 /// Linear RGB of the colour map at 0 to 1.
-fn colour(position: f64) -> [f32; 3] {
+pub(crate) fn colour(position: f64) -> [f32; 3] {
     let colour = colorous::INFERNO.eval_continuous(position);
     [colour.r, colour.g, colour.b].map(|byte| srgb_decode(f32::from(byte) / 255.0))
 }

@@ -179,7 +179,7 @@ fn compress(t: f32) -> [f32; 2] {
 /// section 11-2, for the division by shifts), one Householder step of fourth order, and one Newton step on the root
 /// itself, whose small correction takes the rounding errors of the root with it. No divisions.
 #[inline(always)]
-fn cube_root(x: f32) -> [f32; 2] {
+pub(crate) fn cube_root(x: f32) -> [f32; 2] {
     let bits = x.to_bits();
     let mut third = (bits >> 2) + (bits >> 4);
     third += third >> 4;

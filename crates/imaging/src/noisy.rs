@@ -101,6 +101,22 @@ impl NoisyLab {
         planes
     }
 
+    /// About what noise adds to [`NoisyLab::planes`]: half the difference of the two pictures, smoothed alike; zeros of one picture.
+    pub fn noise(&self, around: &Neighbourhoods) -> Vec<f32> {
+        let pixels = self.compressed[0].len();
+        let mut planes = vec![0.0; 3 * pixels];
+        let Some(second) = &self.second else { return planes };
+        let half =
+            |c: usize| self.first[c].iter().zip(&second[c]).map(|(a, b)| (a - b) / 2.0).collect::<Vec<f32>>();
+        let halves: [Vec<f32>; 3] = std::array::from_fn(|c| around.smooth(&half(c)));
+        for k in 0..pixels {
+            let tangent = |c: usize| secant([self.smooth[c][k]; 2], [self.compressed[c][k]; 2]);
+            let value = lab(std::array::from_fn(|c| tangent(c) * halves[c][k]));
+            (0..3).for_each(|c| planes[c * pixels + k] = value[c]);
+        }
+        planes
+    }
+
     /// [`NoisyLab::planes`] of a picture between two others; `share` is that of the second.
     pub fn planes_between(&self, other: &Self, share: f32) -> Vec<f32> {
         let mixed = |c: usize| {
@@ -241,5 +257,22 @@ mod tests {
         assert!((mean - exact).abs() < 4.0 * spread / 10.0 + 0.05 * exact, "{mean} {exact} {spread}");
         let error = found.iter().map(|e| e.error).sum::<f64>() / found.len() as f64;
         assert!(error > 0.4 * spread && error < 2.5 * spread, "{error} {spread}");
+    }
+
+    #[test]
+    fn noise_is_as_long_as_what_it_adds() {
+        let around = Neighbourhoods::new(&(0..(WIDTH * WIDTH) as u32).collect::<Vec<_>>(), WIDTH);
+        let clean = NoisyLab::new(&[picture(1.0)], &around);
+        let squared = |planes: &[f32]| planes.iter().map(|v| f64::from(v * v)).sum::<f64>();
+        assert_eq!(squared(&clean.noise(&around)), 0.0);
+        let (mut told, mut added) = (0.0, 0.0);
+        for seed in 0..20 {
+            let halves = [noisy(&picture(1.0), 2 * seed), noisy(&picture(1.0), 2 * seed + 1)];
+            let lab = NoisyLab::new(&halves, &around);
+            told += squared(&lab.noise(&around));
+            let off: Vec<f32> = lab.planes().iter().zip(clean.planes()).map(|(a, b)| a - b).collect();
+            added += squared(&off);
+        }
+        assert!((told / added - 1.0).abs() < 0.15, "{told} {added}");
     }
 }

@@ -3,8 +3,8 @@
 //! They lie beside the repository, not in it. Where they are missing, the tests say so and pass.
 
 use lookmatch_imaging::{
-    Fitness, Image, Mask, ProbeImages, ProbePixels, Reduce, Space, delta_e76, disc_weight,
-    lab_from_linear_srgb, nrmsd, nrmsd_pixels,
+    Fitness, Image, MEAN, Mask, ProbeImages, ProbePixels, Reduce, Space, delta_e76, delta_e2000, disc_weight,
+    distance_correlation, gsm_of_greys, lab_from_linear_srgb, luma_255, nrmsd, nrmsd_pixels,
 };
 use serde_json::Value;
 use std::io::Write;
@@ -70,6 +70,8 @@ fn delta_e() {
     for vector in vectors("delta_e") {
         let found = delta_e76(triple(&vector["lab1"]), triple(&vector["lab2"]));
         assert_close(&[found], &[number(&vector["de76"])], EXACT, "ΔE76");
+        let found = delta_e2000(triple(&vector["lab1"]), triple(&vector["lab2"]));
+        assert_close(&[found], &[number(&vector["de2000"])], EXACT, "CIEDE2000");
     }
 }
 
@@ -100,6 +102,43 @@ fn nrmsd_of_channels() {
         assert_close(&exact, &expected, EXACT, "nrmsd_pixels");
         let single = nrmsd(&image(source), &image(target), None).unwrap();
         assert_close(&single, &expected, SINGLE, "nrmsd");
+    }
+}
+
+#[test]
+fn luma() {
+    for vector in vectors("luma_255") {
+        assert_close(&[luma_255(triple(&vector["rgb"]))], &[number(&vector["y"])], EXACT, "luma_255");
+    }
+}
+
+#[test]
+fn correlation_of_distances() {
+    for vector in vectors("distance_correlation") {
+        let list = |name: &str| vector[name].as_array().unwrap().iter().map(number).collect::<Vec<f64>>();
+        let found = distance_correlation(&list("x"), &list("y")).unwrap();
+        assert_close(&[found], &[number(&vector["dcor"])], EXACT, "distance correlation");
+    }
+}
+
+#[test]
+fn gradient_similarity() {
+    for vector in vectors("gsm") {
+        let rows = |name: &str| -> Vec<f64> {
+            vector[name]
+                .as_array()
+                .unwrap()
+                .iter()
+                .flat_map(|row| row.as_array().unwrap())
+                .map(number)
+                .collect()
+        };
+        let (reference, distorted) = (rows("reference"), rows("distorted"));
+        let width = vector["reference"][0].as_array().unwrap().len();
+        for (key, divisor) in [("gsm", MEAN), ("gsm_divisor16", 16.0), ("gsm_divisor1", 1.0)] {
+            let found = gsm_of_greys(&reference, &distorted, width, divisor).unwrap();
+            assert_close(&[found], &[number(&vector[key])], EXACT, key);
+        }
     }
 }
 

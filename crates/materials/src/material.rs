@@ -44,6 +44,16 @@ impl Value {
         }
     }
 
+    /// The number, the channels of a colour, or all of a list; empty for a choice or a file.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::Number(v) => vec![*v],
+            Self::Colour(c) => c.to_vec(),
+            Self::List(v) => v.to_vec(),
+            Self::Choice(_) | Self::File(_) => Vec::new(),
+        }
+    }
+
     /// What the value consists of, as numbers that tell it from all others of its parameter.
     pub fn bits(&self) -> Vec<u64> {
         let text = |text: &str| text.bytes().map(u64::from).collect();

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, nrmsd, nrmsd_of_noise};
+use lookmatch_imaging::{Estimate, Image, Neighbourhoods, NoisyLab, inner_product, nrmsd, nrmsd_of_noise};
 use lookmatch_materials::{BlackBody, Material, Role};
 use lookmatch_rendering::{Illumination, Observe, Part, Planes, TransportCache};
 use lookmatch_search::Problem;
@@ -25,7 +25,7 @@ use crate::probe::Noise;
 use crate::stage::LIGHTS;
 use crate::strategy::Matched;
 use crate::studio::{Archive, Counts, Sampling, Studio, Takes, studio_of};
-use crate::synthesis::{Pictures as Planar, Syntheses};
+use crate::synthesis::{LabPictures, Syntheses};
 use crate::{Entry, Plan, RemapError, Stage};
 
 /// Names of the reference scene under its lights, point and environment.
@@ -349,14 +349,21 @@ impl CrossStage {
     }
 
     /// The pictures of a look, weighted per pixel: specular and perhaps diffuse ones under both lights.
-    pub(crate) fn pictures(&self, look: &Look, with_diffuse: bool) -> Planar {
-        let diffuse = look.diffuse.as_ref().filter(|_| with_diffuse).map(|diffuse| &diffuse.images);
-        let images = look.specular.iter().chain(diffuse.into_iter().flatten());
-        images.map(|image| self.weighted(image.planes())).collect()
+    pub(crate) fn pictures(&self, look: &Look, with_diffuse: bool) -> LabPictures {
+        shown(look, with_diffuse).map(|image| self.weighted(image.planes())).collect()
+    }
+
+    /// Squared length of the noise in each of the pictures of a look.
+    pub(crate) fn noise(&self, look: &Look, with_diffuse: bool) -> Vec<f64> {
+        let squared = |image: &NoisyLab| {
+            let noise = self.weighted(image.noise(&self.around));
+            inner_product(&noise, &noise)
+        };
+        shown(look, with_diffuse).map(squared).collect()
     }
 
     /// The pictures of a look between two others.
-    pub(crate) fn mixed_pictures(&self, a: &Look, b: &Look, share: f64, with_diffuse: bool) -> Planar {
+    pub(crate) fn mixed_pictures(&self, a: &Look, b: &Look, share: f64, with_diffuse: bool) -> LabPictures {
         let diffuse = a.diffuse.as_ref().zip(b.diffuse.as_ref()).filter(|_| with_diffuse);
         let diffuse = diffuse.map(|(a, b)| a.images.iter().zip(&b.images));
         let pairs = a.specular.iter().zip(&b.specular).chain(diffuse.into_iter().flatten());
@@ -408,6 +415,12 @@ impl CrossStage {
         }
         Score { value, error: variance.sqrt() }
     }
+}
+
+/// What is compared of a look: specular and perhaps diffuse pictures under both lights.
+fn shown(look: &Look, with_diffuse: bool) -> impl Iterator<Item = &NoisyLab> {
+    let diffuse = look.diffuse.as_ref().filter(|_| with_diffuse).map(|diffuse| &diffuse.images);
+    look.specular.iter().chain(diffuse.into_iter().flatten())
 }
 
 impl Look {

@@ -106,8 +106,10 @@ impl Match<'_> {
             Synthesis::new(self.plan.to.model(), self.lattice, self.stage.picture_shares())
         });
         let new: Vec<usize> = (0..points.len()).filter(|k| !synthesis.knows(&points[*k])).collect();
-        let rendered =
-            |k: &usize| Rendered { point: points[*k].clone(), pictures: self.stage.pictures(&seen[*k]) };
+        let rendered = |k: &usize| {
+            let pictures = self.stage.pictures(&seen[*k]);
+            Rendered { point: points[*k].clone(), noise: vec![0.0; pictures.len()], pictures }
+        };
         let rendered: Vec<Rendered> = new.iter().map(rendered).collect();
         // Only what lies between linear pictures needs them.
         let planes = OnceCell::new();

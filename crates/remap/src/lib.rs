@@ -61,5 +61,6 @@ pub use strategy::{Event, remap, remap_across};
 pub use studio::{Counts, RendererRecord, Sampling, Shot, Studio};
 pub use synthesis::SynthesisRecord;
 pub use validate::{
-    Lighting, MethodScores, Scores, Statistics, ValidationReport, Validator, validation_points,
+    Lighting, MethodScores, MetricScores, Scores, Statistics, ValidationReport, Validator, Verdicts,
+    validation_points,
 };

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::gallery::Gallery;
 use crate::projection::{Projection, Sketches};
-use crate::synthesis::Pictures;
+use crate::synthesis::LabPictures;
 use crate::{Plan, RemapError};
 
 /// What the metric knows of a material: its specular and diffuse images under both lights in CIELAB, on the subject's
@@ -180,7 +180,7 @@ impl Stage {
     }
 
     /// The pictures of an appearance, weighted per pixel: specular and diffuse ones under both lights.
-    pub(crate) fn pictures(&self, seen: &Appearance) -> Pictures {
+    pub(crate) fn pictures(&self, seen: &Appearance) -> LabPictures {
         let images = [&seen.specular, &*seen.diffuse];
         images
             .into_iter()
@@ -190,7 +190,7 @@ impl Stage {
     }
 
     /// The pictures of a material whose BSDF lies between two others, given their linear planes and the share of the second.
-    pub(crate) fn mixed_pictures(&self, [a, b]: [&[[Planes; 2]; 2]; 2], share: f64) -> Pictures {
+    pub(crate) fn mixed_pictures(&self, [a, b]: [&[[Planes; 2]; 2]; 2], share: f64) -> LabPictures {
         let share = share as f32;
         let mixed =
             |(a, b): (&Vec<f32>, &Vec<f32>)| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();

@@ -1,6 +1,6 @@
 //! How good a probe is where no search has looked: another scene, other light, beside what people do without it.
 
-use lookmatch_imaging::{Image, Mask, nrmsd};
+use lookmatch_imaging::{Image, METRICS, Mask, Metric, Reading, Verdict, nrmsd, read_metrics};
 use lookmatch_materials::Material;
 use lookmatch_rendering::{EnvironmentLight, Illumination, Observe, Part, Renderer, Scene, TransportCache};
 use rayon::prelude::*;
@@ -44,6 +44,32 @@ pub struct Scores {
     pub masked: [Statistics; 3],
 }
 
+/// A number of a metric other than NRMSD over the source points.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MetricScores {
+    /// As [`Reading::name`].
+    pub name: String,
+    /// As [`Reading::title`].
+    pub title: String,
+    /// Whole image; nothing where pictures are too small for the metric.
+    pub whole: Option<Statistics>,
+    /// With the radial mask on each sphere.
+    pub masked: Option<Statistics>,
+}
+
+/// At how many source points people would say what about whole pictures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Verdicts {
+    /// [`Verdict::Indistinguishable`].
+    pub indistinguishable: usize,
+    /// [`Verdict::SlightlyDifferent`].
+    #[serde(rename = "slightly different")]
+    pub slightly_different: usize,
+    /// [`Verdict::NoticeablyDifferent`].
+    #[serde(rename = "noticeably different")]
+    pub noticeably_different: usize,
+}
+
 /// One way to get a target material, judged.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MethodScores {
@@ -52,6 +78,10 @@ pub struct MethodScores {
     /// Its scores.
     #[serde(flatten)]
     pub scores: Scores,
+    /// The other metrics, at [`ValidationReport::metric_points`].
+    pub metrics: Vec<MetricScores>,
+    /// What people would say, at the same points; nothing where there is none.
+    pub verdicts: Option<Verdicts>,
 }
 
 /// The verdict on a probe under one environment.
@@ -65,6 +95,10 @@ pub struct ValidationReport {
     pub size: usize,
     /// Source points that were rendered.
     pub points: usize,
+    /// How many of them, evenly spread, were judged by all metrics; the others by NRMSD alone.
+    pub metric_points: usize,
+    /// Those metrics; none where they judged nowhere.
+    pub metrics: &'static [Metric],
     /// The probe first, then the baselines that apply.
     pub methods: Vec<MethodScores>,
     /// True where the probe has the lowest mean masked NRMSD, averaged over channels.
@@ -74,14 +108,21 @@ pub struct ValidationReport {
 /// Source points to validate at: all of them, or `count` evenly spread ones.
 pub fn validation_points(probe: &Probe, count: Option<usize>) -> Vec<usize> {
     let total = probe.entries.len();
-    let count = count.unwrap_or(total).clamp(1, total);
-    if count == total {
+    spread(total, count.unwrap_or(total).max(1))
+}
+
+/// Some places of a list, evenly spread, in their order.
+fn spread(total: usize, count: usize) -> Vec<usize> {
+    if count >= total {
         return (0..total).collect();
     }
     // Steps of the golden ratio along the table spread evenly over both axes, where equal steps would fall on
     // few columns.
     let step = |k: usize| ((k as f64 + 0.5) * 0.618_033_988_749_895).fract();
     let mut points = Vec::with_capacity(count);
+    if count == 0 {
+        return points;
+    }
     for point in (0..).map(|k| (step(k) * total as f64) as usize) {
         if !points.contains(&point) {
             points.push(point);
@@ -132,32 +173,48 @@ impl<'a> Validator<'a> {
 
     /// Scores the probe at some of its entries, beside the baselines; `observe` is told of each finished entry.
     ///
+    /// NRMSD costs next to nothing, the other metrics a quarter of a second for each pair of 300 × 300 pixels: they judge at most
+    /// `metric_points` of the entries, evenly spread.
+    ///
     /// # Errors
     /// Where a material cannot be made.
     pub fn validate(
         &self,
         points: &[usize],
+        metric_points: usize,
         observe: &(dyn Fn() + Sync),
     ) -> Result<ValidationReport, RemapError> {
-        let row = |place: &usize| {
-            let row = self.score(*place);
+        let judged = spread(points.len(), metric_points);
+        let row = |(k, place): (usize, &usize)| {
+            let row = self.score(*place, judged.binary_search(&k).is_ok());
             observe();
             row
         };
-        let rows = points.par_iter().map(row).collect::<Result<Vec<_>, RemapError>>()?;
+        let rows = points.par_iter().enumerate().map(row).collect::<Result<Vec<_>, RemapError>>()?;
         let names = std::iter::once("probe").chain(Baseline::ALL.map(Baseline::title));
         let methods: Vec<MethodScores> = names
             .enumerate()
             .filter_map(|(k, name)| {
-                let scores: Option<Vec<_>> = rows.iter().map(|row| row[k]).collect();
-                Some(MethodScores { method: name.into(), scores: summarise(&scores?) })
+                let scores: Option<Vec<&Score>> = rows.iter().map(|row| row[k].as_ref()).collect();
+                Some(method_scores(name, &scores?))
             })
             .collect();
         let mean = |m: &MethodScores| m.scores.masked.iter().map(|s| s.mean).sum::<f64>();
         let probe_is_best = methods[1..].iter().all(|m| mean(&methods[0]) < mean(m));
         let environment = self.scene.environment.as_ref().map(|e| e.map.clone()).unwrap_or_default();
         let (scene, size, points) = (self.scene.name.clone(), self.renderer.size(), points.len());
-        Ok(ValidationReport { scene, environment, size, points, methods, probe_is_best })
+        let metric_points = judged.len();
+        let metrics = if judged.is_empty() { &[] } else { METRICS };
+        Ok(ValidationReport {
+            scene,
+            environment,
+            size,
+            points,
+            metric_points,
+            metrics,
+            methods,
+            probe_is_best,
+        })
     }
 
     /// The source material of an entry, what the probe makes of it, and what each baseline that applies does.
@@ -183,15 +240,19 @@ impl<'a> Validator<'a> {
         self.renderer.render_batch(materials, Part::Full)
     }
 
-    /// Scores of the probe and of each baseline that applies.
-    fn score(&self, place: usize) -> Result<Vec<Option<Score>>, RemapError> {
+    /// Scores of the probe and of each baseline that applies, by NRMSD or by all metrics.
+    fn score(&self, place: usize, by_all: bool) -> Result<Vec<Option<Score>>, RemapError> {
         let (source, targets) = self.materials(place)?;
         let materials: Vec<&Material> = std::iter::once(&source).chain(targets.iter().flatten()).collect();
         let mut images = self.render(&materials).into_iter();
         let Some(reference) = images.next() else { return Ok(Vec::new()) };
+        let metrics: Vec<&Metric> = METRICS.iter().filter(|_| by_all).collect();
         let score = |image: Image| -> Result<Score, RemapError> {
-            let masked = nrmsd(&reference, &image, Some(self.renderer.mask()))?;
-            Ok([nrmsd(&reference, &image, None)?, masked])
+            let mask = Some(self.renderer.mask());
+            Ok(Score {
+                nrmsd: [nrmsd(&reference, &image, None)?, nrmsd(&reference, &image, mask)?],
+                readings: read_metrics(&metrics, &reference, &image, mask)?,
+            })
         };
         targets
             .iter()
@@ -200,11 +261,50 @@ impl<'a> Validator<'a> {
     }
 }
 
-/// NRMSD whole and masked.
-type Score = [[f64; 3]; 2];
+/// A picture, judged.
+struct Score {
+    /// Whole and masked.
+    nrmsd: [[f64; 3]; 2],
+    /// Empty where NRMSD alone was asked for.
+    readings: Vec<Reading>,
+}
 
-fn summarise(scores: &[Score]) -> Scores {
-    let channel =
-        |kind: usize| std::array::from_fn(|c| Statistics::of(scores.iter().map(move |score| score[kind][c])));
-    Scores { whole: channel(0), masked: channel(1) }
+fn method_scores(name: &str, scores: &[&Score]) -> MethodScores {
+    let channel = |kind: usize| {
+        std::array::from_fn(|c| Statistics::of(scores.iter().map(move |score| score.nrmsd[kind][c])))
+    };
+    let judged: Vec<&[Reading]> =
+        scores.iter().map(|score| &score.readings[..]).filter(|readings| !readings.is_empty()).collect();
+    let metrics = judged.first().map_or(Vec::new(), |first| {
+        (0..first.len())
+            .map(|k| metric_scores(&judged.iter().map(|readings| &readings[k]).collect::<Vec<_>>()))
+            .collect()
+    });
+    MethodScores {
+        method: name.into(),
+        scores: Scores { whole: channel(0), masked: channel(1) },
+        metrics,
+        verdicts: verdicts(&judged),
+    }
+}
+
+/// One number over the points.
+fn metric_scores(readings: &[&Reading]) -> MetricScores {
+    let over = |value: fn(&Reading) -> Option<f64>| {
+        let values: Option<Vec<f64>> = readings.iter().map(|reading| value(reading)).collect();
+        values.map(|values| Statistics::of(values.iter().copied()))
+    };
+    let Reading { name, title, .. } = readings[0].clone();
+    MetricScores { name, title, whole: over(|reading| reading.whole), masked: over(|reading| reading.masked) }
+}
+
+fn verdicts(judged: &[&[Reading]]) -> Option<Verdicts> {
+    let jod = |readings: &&[Reading]| readings.iter().find(|reading| reading.name == "jod")?.whole;
+    let jods: Vec<f64> = judged.iter().filter_map(jod).collect();
+    let count = |verdict: Verdict| jods.iter().filter(|jod| Verdict::of(**jod) == verdict).count();
+    (!jods.is_empty()).then(|| Verdicts {
+        indistinguishable: count(Verdict::Indistinguishable),
+        slightly_different: count(Verdict::SlightlyDifferent),
+        noticeably_different: count(Verdict::NoticeablyDifferent),
+    })
 }

@@ -48,7 +48,7 @@ fn one_material_is_the_plain_picture() {
     let tracer = PathTracer::prepare(&Scene::spheres(), Illumination::All, SIZE, 16, 3).unwrap();
     let plastic = material("ggx:roughness=0.1,diffuse=0.3");
     let plain = tracer.render(&plastic, Part::Full);
-    assert!(tracer.render_dressed(&[plastic.clone()], &|_| 0, Part::Full) == plain);
+    assert!(tracer.render_dressed(std::slice::from_ref(&plastic), &|_| 0, Part::Full) == plain);
     let twins = [plastic.clone(), plastic];
     assert!(tracer.render_dressed(&twins, &|spot| spot.subject % 2, Part::Full) == plain);
 }

@@ -6,6 +6,7 @@
 
 use std::sync::atomic::AtomicBool;
 
+use itertools::Itertools;
 use lookmatch_materials::{Kind, Material, Value};
 use lookmatch_remap::{Axis, Probe, RemapError, apply};
 use rayon::prelude::*;
@@ -61,16 +62,6 @@ pub(crate) struct Baked {
     /// The target's other parameters.
     pub(crate) constants: Vec<(&'static str, Value)>,
     table: Option<Lut>,
-}
-
-/// The numbers of a value; none for a choice or a file.
-pub(crate) fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Number(v) => vec![*v],
-        Value::Colour(c) => c.to_vec(),
-        Value::List(v) => v.to_vec(),
-        Value::Choice(_) | Value::File(_) => Vec::new(),
-    }
 }
 
 /// What is asked: the probe with the parameters that textures leave alone.
@@ -187,7 +178,7 @@ impl Baked {
             let parameters = model.resolve(&axis.name).map_err(RemapError::from)?;
             let points = |channel: usize| -> Vec<f64> {
                 let value = |t: &Option<Vec<Value>>| {
-                    t.as_ref().and_then(|t| numbers(&t[parameters[0]]).get(channel).copied())
+                    t.as_ref().and_then(|t| t[parameters[0]].numbers().get(channel).copied())
                 };
                 targets.iter().map(|t| value(t).unwrap_or(f64::NAN)).collect()
             };
@@ -420,10 +411,10 @@ fn keeps_channels(question: &Question, index: usize, middle: &[f64]) -> Result<b
         source.set_value(place, colour).map_err(RemapError::from)?;
     }
     let Some(mixed) = question.target(&source)? else { return Ok(false) };
-    let mixed = numbers(&mixed[index]);
+    let mixed = mixed[index].numbers();
     for (channel, share) in shares.into_iter().enumerate() {
         let Some(grey) = question.target(&question.source(&at(share))?)? else { return Ok(false) };
-        let (Some(mixed), Some(grey)) = (mixed.get(channel), numbers(&grey[index]).first().copied()) else {
+        let (Some(mixed), Some(grey)) = (mixed.get(channel), grey[index].numbers().first().copied()) else {
             return Ok(false);
         };
         if (mixed - grey).abs() > crate::TOLERANCE * grey.abs().max(1e-2) {
@@ -435,9 +426,5 @@ fn keeps_channels(question: &Question, index: usize, middle: &[f64]) -> Result<b
 
 /// The points of a grid, the first axis slowest.
 pub(crate) fn points(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    levels.iter().fold(vec![Vec::new()], |points, levels| {
-        let longer =
-            |point: Vec<f64>| levels.iter().map(move |l| [&point[..], &[*l]].concat()).collect::<Vec<_>>();
-        points.into_iter().flat_map(longer).collect()
-    })
+    levels.iter().map(|levels| levels.iter().copied()).multi_cartesian_product().collect()
 }

@@ -13,7 +13,7 @@ use lookmatch_remap::RemapError;
 use rayon::prelude::*;
 
 use crate::TextureError;
-use crate::bake::{Question, numbers, points, range};
+use crate::bake::{Question, points, range};
 use crate::lut::{Between, Lut};
 
 /// Largest error of a table of carried-over values, as a share of the range that they have.
@@ -184,7 +184,7 @@ impl Proportion {
             others.iter().zip(point).for_each(|(input, value)| values[*input] = *value);
             let mut source = question.source(&values)?;
             source.set_value(place, Value::Colour(colour)).map_err(RemapError::from)?;
-            Ok(question.target(&source)?.map(|target| numbers(&target[index])))
+            Ok(question.target(&source)?.map(|target| target[index].numbers()))
         };
         let limit = question.limits(index)[1];
         let is_one = |point: &Vec<f64>, reference: f64| -> Result<bool, TextureError> {
@@ -254,7 +254,7 @@ impl<'a> Known<'a> {
         let mut values = self.middle.to_vec();
         self.inputs.iter().zip(point).for_each(|(input, value)| values[*input] = *value);
         let target = self.question.target(&self.question.source(&values)?)?;
-        let found = target.map_or_else(Vec::new, |target| numbers(&target[self.index]));
+        let found = target.map_or_else(Vec::new, |target| target[self.index].numbers());
         let channel = |c: usize| found.get(c).or(found.first()).map_or(f64::NAN, |v| v / self.divisor);
         Ok(std::array::from_fn(channel))
     }

@@ -6,10 +6,10 @@ use lookmatch_remap::Probe;
 use lookmatch_textures::{Channel, Encoding, Format, Progress, Report, Request, convert};
 
 use super::apply::{pairs, source};
+use super::interruption;
 use crate::Usage;
 use crate::args::ApplyArgs;
 use crate::output::{bar, print, print_json, spinner, table};
-use crate::renderers::interruption;
 
 pub(crate) fn run(args: &ApplyArgs) -> anyhow::Result<()> {
     let probe = Probe::read(&args.probe)?;

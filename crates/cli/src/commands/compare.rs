@@ -1,21 +1,37 @@
-//! `lookmatch compare`: two materials side by side, with their difference in numbers.
+//! `lookmatch compare`: two materials side by side, or two pictures, with their difference in numbers.
 
+use std::path::Path;
 use std::sync::Arc;
 
-use lookmatch_imaging::{Image, Mask, error_map, nrmsd, nrmsd_of_noise, write};
+use lookmatch_imaging::{
+    FLIP_PIXELS_PER_DEGREE, Image, Mask, error_map, flip_map, nrmsd, nrmsd_of_noise, write,
+};
 use lookmatch_materials::Material;
 use lookmatch_rendering::{Illumination, Part, Renderer, Scene};
 use serde_json::json;
 
+use crate::Usage;
 use crate::args::CompareArgs;
-use crate::commands::{create_folder, lit_scene, material};
+use crate::commands::{compare_pictures, create_folder, interruption, lit_scene, material};
+use crate::judgement::Judgement;
 use crate::output::{print, print_json, score, spinner, table};
-use crate::renderers::{Renderers, interruption, plain_scene, renderer_of};
+use crate::renderers::{Renderers, plain_scene, renderer_of};
 use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
+    match (&args.pictures[..], &args.source, &args.target, &args.output) {
+        ([source, target], ..) => compare_pictures::run(args, [source, target]),
+        (_, Some(source), Some(target), Some(output)) => materials(args, [source, target], output),
+        _ => Err(Usage("compare needs two pictures, or --source, --target and --output".into()).into()),
+    }
+}
+
+fn materials(args: &CompareArgs, texts: [&String; 2], output: &Path) -> anyhow::Result<()> {
+    if let Some(mask) = &args.mask {
+        let wrong = format!("--mask {mask} is for two pictures; scenes have masks of their own");
+        return Err(Usage(wrong).into());
+    }
     let (mut scene, illumination) = lit_scene(&args.scene, &args.light)?;
-    let texts = [&args.source, &args.target];
     let named: Vec<String> = texts.into_iter().filter_map(|text| renderer_of(text)).collect();
     if let Some(name) = named.first() {
         scene = plain_scene(scene, name)?;
@@ -29,28 +45,36 @@ pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
     // Only other renderers are to end in order; our own work ends at once.
     let stopped = if named.is_empty() { Arc::default() } else { interruption()? };
     let renderers = Renderers::start(&named, &args.renderers, &stopped)?;
-    let (source, target) = (material(&args.source)?, material(&args.target)?);
+    let (source, target) = (material(texts[0])?, material(texts[1])?);
     let scene = scene.for_model(source.model()).for_model(target.model());
     let views = Views { args, scene: &scene, illumination, renderers: &renderers };
     let [a, b] = views.take([&source, &target])?;
     let mask = scene.mask(args.size)?;
     let (whole, masked) = (nrmsd(&a.image, &b.image, None)?, nrmsd(&a.image, &b.image, Some(&mask))?);
     let [noise, noise_masked] = [floor(&a, &b, None)?, floor(&a, &b, Some(&mask))?];
+    let judgement = Judgement::of(&a.image, &b.image, Some(&mask))?;
     let (map, scale) = error_map(&a.image, &b.image, None)?;
-    create_folder(&args.output)?;
-    let file = |name: &str| args.output.join(name);
+    create_folder(output)?;
+    let file = |name: &str| output.join(name);
     let notes = |material: &dyn ToString| [("lookmatch:material".to_owned(), material.to_string())];
     write(&file("source.exr"), &a.image, &notes(&source))?;
     write(&file("target.exr"), &b.image, &notes(&target))?;
     write(&file("source.png"), &a.image, &notes(&source))?;
     write(&file("target.png"), &b.image, &notes(&target))?;
     write(&file("error.png"), &map, &[])?;
+    write(
+        &file("flip.png"),
+        &flip_map(&a.image, &b.image, FLIP_PIXELS_PER_DEGREE)?.false_colours(1.0)?,
+        &[],
+    )?;
     write(&file("side-by-side.png"), &Image::beside(&[&a.image, &b.image, &map]), &[])?;
     let result = json!({
         "source": source, "target": target, "scene": scene.name, "light": args.light, "size": args.size,
         "nrmsd": whole, "nrmsd_masked": masked, "error_scale": scale,
         "noise_nrmsd": noise, "noise_nrmsd_masked": noise_masked,
         "renderers": renderers.records(&[source.model(), target.model()]),
+        "metrics": judgement.metrics(), "verdict": judgement.verdict(),
+        "share_choosing_correctly": judgement.share_choosing_correctly(),
     });
     let text = serde_json::to_string_pretty(&result)?;
     lookmatch_imaging::write_atomically(&file("result.json"), |out| out.write_all(text.as_bytes()))?;
@@ -63,8 +87,8 @@ pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<()> {
         rows.push(row(name, value));
         rows.extend(noise.map(|noise| row(&format!("{name}, noise alone"), noise)));
     }
-    print(&table(&rows))?;
-    eprintln!("pictures in {} (error map: white is {scale:.3})", args.output.display());
+    print(&format!("{}\n{}", table(&rows), judgement.text()))?;
+    eprintln!("pictures in {} (error map: white is {scale:.3})", output.display());
     Ok(())
 }
 

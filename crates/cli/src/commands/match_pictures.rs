@@ -16,10 +16,10 @@ use serde_json::{Value as Json, json};
 
 use crate::Usage;
 use crate::args::MatchArgs;
-use crate::commands::create_folder;
 use crate::commands::remap::endpoint;
+use crate::commands::{create_folder, interruption};
 use crate::output::{print, print_json, score, spinner, table};
-use crate::renderers::{Renderers, interruption, renderer_of};
+use crate::renderers::{Renderers, renderer_of};
 use crate::transport::{Preparation, cache};
 
 /// Lights in the order of everything that is given for them.

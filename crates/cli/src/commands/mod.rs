@@ -5,6 +5,7 @@ pub(crate) mod apply_textures;
 pub(crate) mod bench;
 pub(crate) mod cache;
 pub(crate) mod compare;
+pub(crate) mod compare_pictures;
 pub(crate) mod compose;
 pub(crate) mod cross;
 pub(crate) mod eval;
@@ -23,12 +24,22 @@ pub(crate) mod scene;
 pub(crate) mod validate;
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use lookmatch_materials::Material;
 use lookmatch_rendering::{EnvironmentLight, Illumination, Scene};
 
 use crate::Usage;
+
+/// A flag that Ctrl-C raises. Asked for once, by commands that end their work in order.
+pub(crate) fn interruption() -> anyhow::Result<Arc<AtomicBool>> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = stopped.clone();
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+    Ok(stopped)
+}
 
 /// A material from its text, its JSON, or a .json file.
 pub(crate) fn material(text: &str) -> anyhow::Result<Material> {

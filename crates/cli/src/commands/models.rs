@@ -4,8 +4,9 @@ use lookmatch_materials::{Family, Kind, Model, Named, Parameter, Preset, by_name
 use serde_json::json;
 
 use crate::args::ModelsArgs;
+use crate::commands::interruption;
 use crate::output::{print, print_json, table};
-use crate::renderers::{Renderers, interruption, renderer_of};
+use crate::renderers::{Renderers, renderer_of};
 
 pub(crate) fn run(args: &ModelsArgs) -> anyhow::Result<()> {
     if args.markdown {

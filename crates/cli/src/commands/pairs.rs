@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::Usage;
 use crate::args::PairsArgs;
-use crate::commands::create_folder;
+use crate::commands::{create_folder, interruption};
 use crate::output::{bar, print, print_json, table};
-use crate::renderers::{interruption, only_ours};
+use crate::renderers::only_ours;
 use crate::transport::{Preparation, cache};
 
 /// All that is known of a run: what decides its outcome, and the pairs that are done.

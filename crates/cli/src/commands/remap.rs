@@ -15,9 +15,9 @@ use serde_json::json;
 
 use crate::args::{PresetName, RemapArgs, StrategyName};
 use crate::commands::fit::{FIT_POINTS, fit_summary, fit_to};
-use crate::commands::{check_output, create_folder};
+use crate::commands::{check_output, create_folder, interruption};
 use crate::output::{bar, loss_table, noise_text, print_json, renders_text, saved};
-use crate::renderers::{Renderers, interruption, renderer_of};
+use crate::renderers::{Renderers, renderer_of};
 use crate::transport::{Preparation, cache};
 use crate::{Usage, report};
 

@@ -10,9 +10,9 @@ use serde_json::json;
 
 use crate::Usage;
 use crate::args::RenderArgs;
-use crate::commands::{check_picture, lit_scene, material};
+use crate::commands::{check_picture, interruption, lit_scene, material};
 use crate::output::{bar, print_json};
-use crate::renderers::{Renderers, interruption, plain_scene, renderer_of};
+use crate::renderers::{Renderers, plain_scene, renderer_of};
 use crate::transport::{Preparation, cache};
 
 pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {

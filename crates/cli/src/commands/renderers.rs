@@ -12,11 +12,11 @@ use lookmatch_renderers::{
 };
 use serde_json::json;
 
-use super::create_folder;
+use super::{create_folder, interruption};
 use crate::Usage;
 use crate::args::{CheckArgs, RenderersArgs, RenderersCommand};
 use crate::output::{print, print_json, spinner, table};
-use crate::renderers::{interruption, launch, launch_command};
+use crate::renderers::{launch, launch_command};
 
 pub(crate) fn run(args: &RenderersArgs) -> anyhow::Result<()> {
     match &args.command {

@@ -5,6 +5,7 @@ use lookmatch_remap::{Lighting, Probe, ValidationReport, Validator, validation_p
 use crate::Usage;
 use crate::args::ValidateArgs;
 use crate::commands::check_output;
+use crate::judgement::validation_text;
 use crate::output::{bar, print, print_json};
 use crate::report::scores_table;
 use crate::transport::{Preparation, cache};
@@ -25,7 +26,7 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     let points = validation_points(&probe, args.points);
     let reports = lights
         .iter()
-        .map(|light| with_progress(&prepared(&probe, light, args.size)?, &points))
+        .map(|light| with_progress(&prepared(&probe, light, args.size)?, &points, args.metric_points))
         .collect::<anyhow::Result<Vec<_>>>()?;
     if let Some(output) = &args.output {
         let text = serde_json::to_string_pretty(&reports)?;
@@ -34,7 +35,8 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     if args.json.json {
         return print_json(&reports);
     }
-    let text: Vec<String> = reports.iter().map(scores_table).collect();
+    let text: Vec<String> =
+        reports.iter().map(|report| scores_table(report) + &validation_text(report)).collect();
     print(&text.join("\n"))
 }
 
@@ -64,10 +66,14 @@ pub(crate) fn prepared<'a>(probe: &'a Probe, light: &Lighting, size: usize) -> a
     Ok(validator)
 }
 
-/// Validates at some entries with a progress bar.
-pub(crate) fn with_progress(validator: &Validator, points: &[usize]) -> anyhow::Result<ValidationReport> {
+/// Validates at some entries, at some of them by all metrics, with a progress bar.
+pub(crate) fn with_progress(
+    validator: &Validator,
+    points: &[usize],
+    metric_points: usize,
+) -> anyhow::Result<ValidationReport> {
     let progress = bar(points.len(), "validating");
-    let report = validator.validate(points, &|| progress.inc(1))?;
+    let report = validator.validate(points, metric_points, &|| progress.inc(1))?;
     progress.finish_and_clear();
     Ok(report)
 }

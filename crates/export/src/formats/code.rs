@@ -2,8 +2,19 @@
 
 use std::fmt::Write;
 
-use crate::function::{Function, Scale, Shape, cubic};
-use crate::mapping::{Factor, Formula, Mapping, Output, identifier};
+use super::spelling::Spelling;
+use crate::function::{Function, Shape, cubic};
+use crate::mapping::{Factor, Mapping, identifier};
+
+/// How these languages spell expressions.
+pub(crate) const SPELLING: Spelling = Spelling {
+    number,
+    clamp: |value, min, max| format!("clamp({value}, {min}, {max})"),
+    log: "log",
+    exp: "exp",
+    function: |mapping, function| format!("{}_{}", mapping.name(), identifier(&function.name)),
+    hue: |name| format!("hue_{name}"),
+};
 
 /// A number as these languages read it, in single precision.
 pub(crate) fn number(value: f64) -> String {
@@ -47,15 +58,10 @@ pub(crate) struct Code {
     pub(crate) body: String,
 }
 
-/// The name of a function of a mapping, and the names of its arguments.
-fn names(mapping: &Mapping, function: &Function) -> (String, Vec<String>) {
-    let arguments = function.arguments.iter().map(|a| identifier(&mapping.inputs[a.input].name));
-    (format!("{}_{}", mapping.name(), identifier(&function.name)), arguments.collect())
-}
-
 /// Writes a function of a mapping.
 pub(crate) fn code(mapping: &Mapping, function: &Function) -> Code {
-    let (name, arguments) = names(mapping, function);
+    let name = (SPELLING.function)(mapping, function);
+    let arguments = mapping.arguments(function);
     let mut code = Code {
         signature: format!(
             "float {name}({})",
@@ -69,7 +75,7 @@ pub(crate) fn code(mapping: &Mapping, function: &Function) -> Code {
         match argument.scale {
             None => places.push(name.clone()),
             Some(scale) => {
-                writeln!(code.body, "    float u_{name} = {};", normalised(name, &scale)).ok();
+                writeln!(code.body, "    float u_{name} = {};", SPELLING.normalised(name, &scale)).ok();
                 places.push(format!("u_{name}"));
             }
         }
@@ -88,20 +94,8 @@ pub(crate) fn code(mapping: &Mapping, function: &Function) -> Code {
         }
         Shape::Spline { knots, values, slopes } => code.spline(&prefix, (knots, values, slopes), &places[0]),
     };
-    let value = if function.logarithmic { format!("exp({value})") } else { value };
-    let value = match function.range {
-        Some([min, max]) => format!("clamp({value}, {}, {})", number(min), number(max)),
-        None => value,
-    };
-    writeln!(code.body, "    return {value};").ok();
+    writeln!(code.body, "    return {};", SPELLING.result(function, value)).ok();
     code
-}
-
-fn normalised(name: &str, scale: &Scale) -> String {
-    let [factor, summand] = scale.line();
-    let value = format!("clamp({name}, {}, {})", number(scale.min), number(scale.max));
-    let value = if scale.logarithmic { format!("log({value})") } else { value };
-    format!("{} * {value} + {}", number(factor), number(summand))
 }
 
 impl Code {
@@ -185,37 +179,4 @@ pub(crate) fn hues(mapping: &Mapping) -> Vec<String> {
     let formulas = || mapping.outputs.iter().flat_map(|o| &o.channels);
     let is_used = |i: &usize| formulas().any(|f| f.factor == Factor::Hue(*i));
     (0..mapping.inputs.len()).filter(is_used).map(|i| identifier(&mapping.inputs[i].name)).collect()
-}
-
-/// The expressions of an output's channels, within its range.
-pub(crate) fn expressions(mapping: &Mapping, output: &Output) -> Vec<String> {
-    let channel = |(c, formula)| clamped(&expression(mapping, formula, c), formula, output.range);
-    output.channels.iter().enumerate().map(channel).collect()
-}
-
-fn expression(mapping: &Mapping, formula: &Formula, channel: usize) -> String {
-    let read = |i: usize| {
-        let name = identifier(&mapping.inputs[i].name);
-        if mapping.inputs[i].is_colour { format!("{name}[{channel}]") } else { name }
-    };
-    let call = formula.function.map(|f| {
-        let function = &mapping.functions[f];
-        let arguments: Vec<String> = function.arguments.iter().map(|a| read(a.input)).collect();
-        format!("{}({})", names(mapping, function).0, arguments.join(", "))
-    });
-    let factor = match formula.factor {
-        Factor::Constant(1.0) if call.is_some() => None,
-        Factor::Constant(value) => Some(number(value)),
-        Factor::Input(i) => Some(read(i)),
-        Factor::Hue(i) => Some(format!("hue_{}[{channel}]", identifier(&mapping.inputs[i].name))),
-    };
-    call.into_iter().chain(factor).collect::<Vec<_>>().join(" * ")
-}
-
-/// An expression moved into a range where it can leave it.
-fn clamped(expression: &str, formula: &Formula, range: [f64; 2]) -> String {
-    match formula.factor {
-        Factor::Constant(_) => expression.to_owned(),
-        _ => format!("clamp({expression}, {}, {})", number(range[0]), number(range[1])),
-    }
 }

@@ -2,31 +2,16 @@
 
 use std::fmt::Write;
 
-use lookmatch_remap::Probe;
-
-use super::code::{ascii_comment, code, expressions, hues, number, rows};
-use super::{Exported, Format, Options};
-use crate::ExportError;
+use super::Language;
+use super::code::{SPELLING, ascii_comment, code, hues, number, rows};
 use crate::mapping::{Mapping, identifier};
 
 /// `glsl`.
-pub(crate) struct Glsl;
-
-impl Format for Glsl {
-    fn name(&self) -> &'static str {
-        "glsl"
-    }
-
-    fn summary(&self) -> &'static str {
-        "a function for shaders (GLSL 3.30, GLSL ES 3.00 and later), to be included"
-    }
-
-    fn export(&self, probe: &Probe, options: &Options) -> Result<Exported, ExportError> {
-        let mapping = Mapping::new(probe, options)?;
-        let text = text(&mapping);
-        Ok(Exported::of(mapping, text))
-    }
-}
+pub(crate) const GLSL: Language = Language {
+    name: "glsl",
+    summary: "a function for shaders (GLSL 3.30, GLSL ES 3.00 and later), to be included",
+    text,
+};
 
 fn text(mapping: &Mapping) -> String {
     let name = mapping.name();
@@ -68,7 +53,7 @@ fn text(mapping: &Mapping) -> String {
         writeln!(text, "    vec3 hue_{hue} = {name}_hue({hue});").ok();
     }
     for output in &mapping.outputs {
-        let value = expressions(mapping, output).join(", ");
+        let value = SPELLING.expressions(mapping, output).join(", ");
         let value = if output.channels.len() == 1 { value } else { format!("vec3({value})") };
         writeln!(text, "    result.{} = {value};", identifier(&output.name)).ok();
     }

@@ -210,7 +210,7 @@ impl Writer<'_> {
         let values: Vec<String> = output.channels.iter().map(value).collect::<Option<_>>()?;
         let kind = kind(output.channels.len() == 3);
         let inputs = [("value", kind, Arg::value(values.join(", ")))];
-        Some(self.graph.add_anew("constant", kind, &format!("{name}_constant"), &inputs))
+        Some(self.graph.push(Element::node("constant", kind, &inputs), &format!("{name}_constant")))
     }
 
     /// Whether a formula gives each channel another value.

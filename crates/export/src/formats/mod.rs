@@ -7,6 +7,7 @@ mod glsl;
 mod materialx;
 mod osl;
 mod python;
+mod spelling;
 
 use lookmatch_materials::Material;
 use lookmatch_remap::Probe;
@@ -30,9 +31,32 @@ pub trait Format: Sync {
     fn export(&self, probe: &Probe, options: &Options) -> Result<Exported, ExportError>;
 }
 
+/// A format whose file is a text that a mapping alone determines.
+struct Language {
+    name: &'static str,
+    summary: &'static str,
+    text: fn(&Mapping) -> String,
+}
+
+impl Format for Language {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn summary(&self) -> &'static str {
+        self.summary
+    }
+
+    fn export(&self, probe: &Probe, options: &Options) -> Result<Exported, ExportError> {
+        let mapping = Mapping::new(probe, options)?;
+        let text = (self.text)(&mapping);
+        Ok(Exported::of(mapping, text))
+    }
+}
+
 /// All formats.
 pub fn formats() -> &'static [&'static dyn Format] {
-    &[&materialx::MaterialX, &glsl::Glsl, &osl::Osl, &python::Python, &csv::Csv, &cube::CubeLut]
+    &[&materialx::MaterialX, &glsl::GLSL, &osl::OSL, &python::PYTHON, &csv::Csv, &cube::CubeLut]
 }
 
 /// One of the files of an export.

@@ -2,31 +2,16 @@
 
 use std::fmt::Write;
 
-use lookmatch_remap::Probe;
-
-use super::code::{ascii, ascii_comment, code, expressions, hues, number, rows};
-use super::{Exported, Format, Options};
-use crate::ExportError;
+use super::Language;
+use super::code::{SPELLING, ascii, ascii_comment, code, hues, number, rows};
 use crate::mapping::{Input, Mapping, identifier};
 
 /// `osl`.
-pub(crate) struct Osl;
-
-impl Format for Osl {
-    fn name(&self) -> &'static str {
-        "osl"
-    }
-
-    fn summary(&self) -> &'static str {
-        "a shader node (Open Shading Language) with source parameters in and target parameters out"
-    }
-
-    fn export(&self, probe: &Probe, options: &Options) -> Result<Exported, ExportError> {
-        let mapping = Mapping::new(probe, options)?;
-        let text = text(&mapping);
-        Ok(Exported::of(mapping, text))
-    }
-}
+pub(crate) const OSL: Language = Language {
+    name: "osl",
+    summary: "a shader node (Open Shading Language) with source parameters in and target parameters out",
+    text,
+};
 
 fn text(mapping: &Mapping) -> String {
     let name = mapping.name();
@@ -60,7 +45,7 @@ fn text(mapping: &Mapping) -> String {
         writeln!(text, "    color hue_{hue} = {name}_hue({hue});").ok();
     }
     for (output, port) in mapping.outputs.iter().zip(ports) {
-        let value = expressions(mapping, output).join(", ");
+        let value = SPELLING.expressions(mapping, output).join(", ");
         let value = if output.channels.len() == 1 { value } else { format!("color({value})") };
         writeln!(text, "    {port} = {value};").ok();
     }

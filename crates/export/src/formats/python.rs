@@ -2,32 +2,28 @@
 
 use std::fmt::Write;
 
-use lookmatch_remap::Probe;
-
+use super::Language;
 use super::code::{comment, rows};
-use super::{Exported, Format, Options};
-use crate::ExportError;
+use super::spelling::Spelling;
 use crate::function::{Function, Shape, cubic};
-use crate::mapping::{Factor, Formula, Mapping, identifier};
+use crate::mapping::{Mapping, identifier};
 
 /// `python`.
-pub(crate) struct Python;
+pub(crate) const PYTHON: Language = Language {
+    name: "python",
+    summary: "a Python 3 module without dependencies, with a function and a command line",
+    text,
+};
 
-impl Format for Python {
-    fn name(&self) -> &'static str {
-        "python"
-    }
-
-    fn summary(&self) -> &'static str {
-        "a Python 3 module without dependencies, with a function and a command line"
-    }
-
-    fn export(&self, probe: &Probe, options: &Options) -> Result<Exported, ExportError> {
-        let mapping = Mapping::new(probe, options)?;
-        let text = text(&mapping);
-        Ok(Exported::of(mapping, text))
-    }
-}
+/// How Python spells expressions.
+const SPELLING: Spelling = Spelling {
+    number,
+    clamp: |value, min, max| format!("min(max({value}, {min}), {max})"),
+    log: "math.log",
+    exp: "math.exp",
+    function: |_, function| format!("_{}", identifier(&function.name)),
+    hue: |name| format!("_hue({name})"),
+};
 
 fn number(value: f64) -> String {
     format!("{value:?}")
@@ -67,8 +63,7 @@ fn text(mapping: &Mapping) -> String {
     }
     text += "    return {\n";
     for output in &mapping.outputs {
-        let channel = |c: usize| expression(mapping, &output.channels[c], c, output.range);
-        let channels: Vec<String> = (0..output.channels.len()).map(channel).collect();
+        let channels = SPELLING.expressions(mapping, output);
         let value = channels.join(", ");
         let value = if channels.len() == 1 { value } else { format!("({value})") };
         writeln!(text, "        \"{}\": {value},", output.name).ok();
@@ -83,18 +78,11 @@ fn text(mapping: &Mapping) -> String {
 
 /// A function, in full precision.
 fn definition(mapping: &Mapping, function: &Function) -> String {
-    let arguments: Vec<String> =
-        function.arguments.iter().map(|a| identifier(&mapping.inputs[a.input].name)).collect();
+    let arguments = mapping.arguments(function);
     let name = identifier(&function.name);
     let constant = name.to_uppercase();
-    let place = |(argument, name): (&crate::Argument, &String)| match argument.scale {
-        None => name.clone(),
-        Some(scale) => {
-            let [factor, summand] = scale.line().map(number);
-            let value = format!("min(max({name}, {}), {})", number(scale.min), number(scale.max));
-            let value = if scale.logarithmic { format!("math.log({value})") } else { value };
-            format!("{factor} * {value} + {summand}")
-        }
+    let place = |(argument, name): (&crate::Argument, &String)| {
+        argument.scale.map_or_else(|| name.clone(), |scale| SPELLING.normalised(name, &scale))
     };
     let places: Vec<String> = function.arguments.iter().zip(&arguments).map(place).collect();
     let places = places.iter().map(|p| format!("{p},")).collect::<Vec<_>>().join(" ");
@@ -142,34 +130,7 @@ fn definition(mapping: &Mapping, function: &Function) -> String {
             format!("_spline(_{constant}_KNOTS, _{constant}_PIECES, {})", places.trim_end_matches(','))
         }
     };
-    let value = if function.logarithmic { format!("math.exp({value})") } else { value };
-    let value = match function.range {
-        Some([min, max]) => format!("min(max({value}, {}), {})", number(min), number(max)),
-        None => value,
-    };
+    let value = SPELLING.result(function, value);
     writeln!(text, "\n\ndef _{name}({}):\n    return {value}", arguments.join(", ")).ok();
     text
-}
-
-fn expression(mapping: &Mapping, formula: &Formula, channel: usize, range: [f64; 2]) -> String {
-    let read = |i: usize| {
-        let name = identifier(&mapping.inputs[i].name);
-        if mapping.inputs[i].is_colour { format!("{name}[{channel}]") } else { name }
-    };
-    let call = formula.function.map(|f| {
-        let function = &mapping.functions[f];
-        let arguments: Vec<String> = function.arguments.iter().map(|a| read(a.input)).collect();
-        format!("_{}({})", identifier(&function.name), arguments.join(", "))
-    });
-    let factor = match formula.factor {
-        Factor::Constant(1.0) if call.is_some() => None,
-        Factor::Constant(value) => Some(number(value)),
-        Factor::Input(i) => Some(read(i)),
-        Factor::Hue(i) => Some(format!("_hue({})[{channel}]", identifier(&mapping.inputs[i].name))),
-    };
-    let value = call.into_iter().chain(factor).collect::<Vec<_>>().join(" * ");
-    match formula.factor {
-        Factor::Constant(_) => value,
-        _ => format!("min(max({value}, {}), {})", number(range[0]), number(range[1])),
-    }
 }

@@ -22,7 +22,7 @@ const MONITOR: &str = "standard_4k";
 /// # Errors
 /// Different sizes; pictures of less than 4 pixels a side, or with pixels that are not finite.
 pub fn jod(source: &Image, picture: &Image) -> Result<f64, ImageError> {
-    source.check_same_size(picture)?;
+    super::check_pair(source, picture, ("ColorVideoVDP", 4))?;
     let metric = Cvvdp::new(DisplayModel::from_name(MONITOR)?, Options::default())?;
     let prediction = metric.predict_image(&frame(picture)?, &frame(source)?, Color::Srgb)?;
     Ok(f64::from(prediction.jod))

@@ -1,6 +1,6 @@
 //! Per-pixel weights that favour the middle of a sphere over its silhouette.
 
-use crate::ImageError;
+use crate::{Image, ImageError, luminance};
 
 /// Weight of every pixel of an image, 0 to 1, row 0 on top, row-major.
 ///
@@ -29,6 +29,12 @@ impl Mask {
         let weight = |x: usize, y: usize| disc_weight(x as f64 + 0.5, y as f64 + 0.5, cx, cy, r) as f32;
         let rows = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         Mask { width, height, weights: rows.map(|(x, y)| weight(x, y)).collect() }
+    }
+
+    /// The luminance of a picture's pixels, clipped to 0..1: white counts in full, black not at all.
+    pub fn from_luminance(image: &Image) -> Mask {
+        let weights = image.pixels().iter().map(|pixel| luminance(*pixel).clamp(0.0, 1.0)).collect();
+        Mask { width: image.width(), height: image.height(), weights }
     }
 
     /// Weight 1 everywhere: the same as no mask.
@@ -83,6 +89,15 @@ mod tests {
         }
         assert!(left.union(&Mask::uniform(2, 4)).is_err());
         assert_eq!(left.union(&Mask::uniform(4, 2)).unwrap(), Mask::uniform(4, 2));
+    }
+
+    #[test]
+    fn pictures_are_masks() {
+        let picture = Image::from_fn(2, 2, |x, y| [x as f32 + 0.5 * y as f32 - 0.25; 3]);
+        let mask = Mask::from_luminance(&picture);
+        for (found, expected) in mask.weights().iter().zip([0.0, 0.75, 0.25, 1.0]) {
+            assert!((found - expected).abs() < 1e-6);
+        }
     }
 
     #[test]

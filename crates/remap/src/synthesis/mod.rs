@@ -9,6 +9,7 @@ mod components;
 mod interpolation;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lookmatch_materials::fresnel::f0_from_ior;
@@ -24,6 +25,8 @@ use interpolation::{Interpolation, Metric};
 
 /// Fitness that the components may leave out of the pictures that they are made of, as root mean square.
 const LEFT_OUT: f64 = 0.01;
+/// Length of noise, in multiples of its measured one, that is left out as well: a little more than there is on average.
+const NOISES: f64 = 1.2;
 /// Points with a switch of their own that need a function of their own, at least.
 const FEWEST: usize = 6;
 /// Levels between the ends of an axis in which the model is linear.
@@ -85,10 +88,10 @@ impl Syntheses {
     pub(crate) fn count(&self, materials: &[Material]) {
         let mut targets = self.targets();
         for material in materials {
-            // FNV-1a over words.
-            let number = key(material).iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| {
-                (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
-            });
+            // Without a random key: a resumed remap compares with numbers that its journal kept.
+            let mut hasher = DefaultHasher::new();
+            key(material).hash(&mut hasher);
+            let number = hasher.finish();
             if targets.all.insert(number) {
                 targets.new.push(number);
             }
@@ -110,24 +113,23 @@ impl Syntheses {
         self.targets().all.len()
     }
 
-    /// How well synthesis went, over all families.
+    /// How well synthesis went, over all families: errors of all of them together, components of the one that has most.
     pub(crate) fn record(&self) -> Option<SynthesisRecord> {
         let families = self.families();
-        families.values().filter_map(Synthesis::record).reduce(SynthesisRecord::with)
-    }
-}
-
-impl SynthesisRecord {
-    /// Of two families.
-    fn with(self, other: Self) -> Self {
-        let held_out = self.held_out + other.held_out;
-        let sum = self.mean * self.held_out as f64 + other.mean * other.held_out as f64;
-        Self {
-            components: [0, 1].map(|k| self.components[k].max(other.components[k])),
-            held_out,
-            mean: sum / held_out.max(1) as f64,
-            most: self.most.max(other.most),
+        if families.values().all(|family| family.learnt.is_empty()) {
+            return None;
         }
+        let components = |kind: usize| {
+            families.values().filter_map(|family| family.components.get(kind)).map(Components::len).max()
+        };
+        let mut errors: Vec<f64> = families.values().flat_map(|family| &family.errors).copied().collect();
+        errors.sort_by(f64::total_cmp);
+        Some(SynthesisRecord {
+            components: [0, 1].map(|kind| components(kind).unwrap_or(0)),
+            held_out: errors.len(),
+            mean: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
+            most: errors.get((0.95 * errors.len() as f64) as usize).copied().unwrap_or(0.0),
+        })
     }
 }
 
@@ -145,16 +147,18 @@ pub(crate) struct Synthesis {
 }
 
 /// The pictures of a material, one of each kind: CIELAB planes, weighted per pixel.
-pub(crate) type Pictures = Vec<Vec<f32>>;
+pub(crate) type LabPictures = Vec<Vec<f32>>;
 
 /// A rendered target.
 pub(crate) struct Rendered {
     pub(crate) point: Point,
-    pub(crate) pictures: Pictures,
+    pub(crate) pictures: LabPictures,
+    /// Squared length of the noise in each: no component is to hold it.
+    pub(crate) noise: Vec<f64>,
 }
 
 /// Makes the pictures of a material between two rendered ones: their places, and the share of the second.
-pub(crate) type Mix<'a> = dyn Fn(usize, usize, f64) -> Pictures + 'a;
+pub(crate) type Mix<'a> = dyn Fn(usize, usize, f64) -> LabPictures + 'a;
 
 /// How an axis of the lattice is measured.
 struct Coordinate {
@@ -247,29 +251,33 @@ impl Synthesis {
             return;
         }
         let between = self.between(rendered);
-        let mixed: Vec<Pictures> = between.iter().map(|(a, b, share, _)| mix(*a, *b, *share)).collect();
+        let mixed: Vec<LabPictures> = between.iter().map(|(a, b, share, _)| mix(*a, *b, *share)).collect();
         if self.components.is_empty() {
             let kind = |kind: usize| {
                 let pictures = rendered.iter().map(|r| &r.pictures).chain(&mixed);
                 let samples: Vec<&[f32]> = pictures.map(|pictures| &*pictures[kind]).collect();
-                Components::of(&samples, self.tolerance(kind))
+                let noise = rendered.iter().map(|r| r.noise[kind]).sum::<f64>() / rendered.len() as f64;
+                Components::of(&samples, self.tolerance(kind, noise))
             };
             self.components = (0..self.shares.len()).map(kind).collect();
         }
         // Whole batches are what a synthesis starts from; candidates come one by one, and were foreseen.
         let error = if let [one] = rendered { self.error(&one.point, &one.pictures) } else { None };
         self.errors.extend(error);
-        for Rendered { point, pictures } in rendered {
+        for Rendered { point, pictures, noise } in rendered {
             self.learnt.insert(point.clone());
-            self.add(point, pictures, error);
+            self.add(point, (pictures, noise), error);
         }
-        for ((_, _, _, point), pictures) in between.iter().zip(&mixed) {
-            self.add(point, pictures, None);
+        for ((a, b, _, point), pictures) in between.iter().zip(&mixed) {
+            let ends = rendered[*a].noise.iter().zip(&rendered[*b].noise);
+            let noise: Vec<f64> = ends.map(|(a, b)| a.max(*b)).collect();
+            self.add(point, (pictures, &noise), None);
         }
     }
 
-    fn tolerance(&self, kind: usize) -> f64 {
-        LEFT_OUT / self.shares[kind].max(1e-12)
+    /// Length that components may leave of a picture with noise of a squared length.
+    fn tolerance(&self, kind: usize, noise: f64) -> f64 {
+        (LEFT_OUT / self.shares[kind].max(1e-12)).hypot(NOISES * noise.sqrt())
     }
 
     /// Between which of some rendered pictures others follow: their places, the share of the second, and the point.
@@ -301,13 +309,14 @@ impl Synthesis {
     }
 
     /// How far the synthesised picture of a point is from the rendered one, in fitness; `None` where there is none.
-    fn error(&mut self, point: &Point, pictures: &Pictures) -> Option<f64> {
+    fn error(&mut self, point: &Point, pictures: &LabPictures) -> Option<f64> {
         let seen = self.seen(pictures);
         self.distances(&seen, std::slice::from_ref(point)).map(|distances| distances[0])
     }
 
-    fn add(&mut self, point: &Point, pictures: &Pictures, error: Option<f64>) {
-        let tolerances: Vec<f64> = (0..self.shares.len()).map(|kind| self.tolerance(kind)).collect();
+    fn add(&mut self, point: &Point, (pictures, noise): (&LabPictures, &[f64]), error: Option<f64>) {
+        let tolerances: Vec<f64> =
+            noise.iter().enumerate().map(|(kind, v)| self.tolerance(kind, *v)).collect();
         let kinds = self.components.iter_mut().zip(pictures).zip(tolerances);
         let loadings: Vec<Vec<f64>> = kinds.map(|((c, p), t)| c.extended(p, t).values).collect();
         let place = self.place(point);
@@ -330,7 +339,7 @@ impl Synthesis {
     }
 
     /// A picture as the components show it.
-    pub(crate) fn seen(&self, pictures: &Pictures) -> Vec<Loadings> {
+    pub(crate) fn seen(&self, pictures: &LabPictures) -> Vec<Loadings> {
         self.components.iter().zip(pictures).map(|(c, picture)| c.loadings(picture)).collect()
     }
 
@@ -364,20 +373,6 @@ impl Synthesis {
             is_known = true;
         }
         is_known.then_some(distances)
-    }
-
-    /// How well it went.
-    pub(crate) fn record(&self) -> Option<SynthesisRecord> {
-        let mut errors = self.errors.clone();
-        errors.sort_by(f64::total_cmp);
-        let most = errors.get((0.95 * errors.len() as f64) as usize).copied().or(errors.last().copied());
-        let components = |kind: usize| self.components.get(kind).map_or(0, Components::len);
-        (!self.learnt.is_empty()).then(|| SynthesisRecord {
-            components: [0, 1].map(components),
-            held_out: errors.len(),
-            mean: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
-            most: most.unwrap_or(0.0),
-        })
     }
 }
 

@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::Usage;
 use crate::args::{CrossArgs, vary};
-use crate::commands::{create_folder, remap};
+use crate::commands::{create_folder, interruption, remap};
 use crate::output::{bar, print, print_json};
-use crate::renderers::{Renderers, interruption, renderer_of};
+use crate::renderers::{Renderers, renderer_of};
 use crate::report::sheet;
 use crate::transport::{Preparation, cache};
 

@@ -21,6 +21,13 @@ impl Element {
         Self::named(tag, &attributes)
     }
 
+    /// A node of a graph, which gives it its name.
+    pub(super) fn node(category: &str, kind: &str, inputs: &[(&'static str, &str, Arg)]) -> Self {
+        let mut node = Self::new(category, &[("name", ""), ("type", kind)]);
+        node.children = inputs.iter().map(|(name, kind, arg)| input(name, kind, arg)).collect();
+        node
+    }
+
     /// The document with this root and a comment at its head.
     pub(super) fn document(&self, head: &[String]) -> String {
         // Two hyphens end a comment.
@@ -82,7 +89,7 @@ impl Graph {
         name: &str,
         inputs: &[(&'static str, &str, Arg)],
     ) -> String {
-        let node = Self::node(category, kind, inputs);
+        let node = Element::node(category, kind, inputs);
         let is_same = |other: &&Element| {
             other.tag == node.tag
                 && other.attributes[1] == node.attributes[1]
@@ -94,25 +101,8 @@ impl Graph {
         }
     }
 
-    /// Adds a node of its own.
-    pub(super) fn add_anew(
-        &mut self,
-        category: &str,
-        kind: &str,
-        name: &str,
-        inputs: &[(&'static str, &str, Arg)],
-    ) -> String {
-        self.push(Self::node(category, kind, inputs), name)
-    }
-
-    fn node(category: &str, kind: &str, inputs: &[(&'static str, &str, Arg)]) -> Element {
-        let mut node = Element::new(category, &[("name", ""), ("type", kind)]);
-        node.children = inputs.iter().map(|(name, kind, arg)| input(name, kind, arg)).collect();
-        node
-    }
-
-    /// Nodes are named once, and not like outputs.
-    fn push(&mut self, mut node: Element, name: &str) -> String {
+    /// Adds a node even if there is one like it, and returns its name. Nodes are named once, and not like outputs.
+    pub(super) fn push(&mut self, mut node: Element, name: &str) -> String {
         let is_taken = |name: &str| self.nodes.iter().any(|n| n.attributes[0].1 == name);
         let numbered = (2..).map(|n| format!("{name}_{n}"));
         let name = [name.to_owned()].into_iter().chain(numbered).find(|n| !is_taken(n)).unwrap_or_default();

@@ -102,8 +102,14 @@ impl Graph {
         levels: &[Vec<f64>],
         values: &[f64],
     ) -> String {
-        if let [columns] = weights {
-            return self.row(name, columns, values);
+        match weights {
+            // What depends on nothing.
+            [] => {
+                let value = [("value", "float", Arg::value(number(values[0])))];
+                return self.add("constant", "float", &format!("{name}_total"), &value);
+            }
+            [columns] => return self.row(name, columns, values),
+            _ => {}
         }
         let stride: usize = levels[1..].iter().map(Vec::len).product();
         let fours: Vec<String> = (0..weights[0].len())
