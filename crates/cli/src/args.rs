@@ -166,7 +166,7 @@ pub(crate) struct EvalArgs {
 
 #[derive(Args)]
 pub(crate) struct RenderArgs {
-    /// reference, spheres, or a scene file (.toml)
+    /// reference, spheres, blobs, checker-wall, spot, shader-ball, or a scene file (.toml)
     pub(crate) scene: String,
     /// MODEL:NAME=VALUE,..., JSON, or a .json file
     #[arg(short, long)]

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use lookmatch_imaging::Image;
 use lookmatch_materials::Material;
-use lookmatch_rendering::{Illumination, Part, PathTracer, Scene, Spot};
+use lookmatch_rendering::{Illumination, Part, PathTracer, Scene, Spot, Wears};
 
 const GOLD: &str = "ggx-conductor:eta=0.143/0.375/1.442,k=3.983/2.386/1.603,roughness=0.2";
 const SILVER: &str = "ggx-conductor:eta=0.155/0.117/0.138,k=4.828/3.122/2.147,roughness=0.2";
@@ -40,6 +40,9 @@ const PATCHES: [[f64; 3]; 24] = [
     [0.03, 0.03, 0.03],
 ];
 
+/// A picture's name, its scene, the materials, and who wears them.
+type Entry<'a> = (&'a str, &'a str, Vec<String>, Wears<'a>);
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let folder = Path::new(arguments.first().ok_or("expected a folder for the pictures")?);
@@ -54,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         row.min(3) * 6 + column
     };
     let by_subject = |spot: Spot| spot.subject;
-    let pictures: [(&str, &str, Vec<String>, &(dyn Fn(Spot) -> usize + Sync)); 8] = [
+    let pictures: [Entry; 8] = [
         ("metals", "spheres", metals.clone(), &by_subject),
         ("blobs", "blobs", vec![plastic.clone()], &|_| 0),
         ("blobs-metals", "blobs", metals, &by_subject),

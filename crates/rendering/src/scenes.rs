@@ -3,8 +3,11 @@
 use crate::scene::up;
 use crate::{Camera, EnvironmentLight, Mesh, Plane, PointLight, Scene, Sphere};
 
+/// A name and what it makes.
+type BuiltIn = (&'static str, fn() -> Scene);
+
 /// Scenes by name.
-pub(crate) const BUILT_IN: [(&str, fn() -> Scene); 6] = [
+pub(crate) const BUILT_IN: [BuiltIn; 6] = [
     ("reference", Scene::reference),
     ("spheres", Scene::spheres),
     ("blobs", Scene::blobs),
@@ -57,11 +60,9 @@ impl Scene {
     /// Three uneven bodies on a checkerboard, for the path renderer: shapes of many curvatures tell reflectances apart better
     /// than spheres do (Vangorp *et al.* 2007).
     pub fn blobs() -> Self {
-        let blob = |seed: u32, x: f64, y: f64| Mesh {
-            rotation: 0.0,
-            ..mesh(&format!("blob:{seed}"), [x, y, 0.0], 1.0)
-        };
-        let meshes = vec![blob(1, -2.3, 0.2), blob(2, 0.0, 0.2), blob(3, 2.3, 0.2)];
+        let blob = |seed: u32, x: f64, y: f64| mesh(&format!("blob:{seed}"), [x, y, 0.0], 0.85);
+        // As high as lets them rest on the board.
+        let meshes = vec![blob(1, -2.1, -0.158), blob(12, 0.0, -0.069), blob(7, 2.1, 0.042)];
         Self { meshes, name: "blobs".into(), spheres: Vec::new(), ..Self::spheres() }
     }
 
@@ -72,7 +73,8 @@ impl Scene {
             camera: Camera { eye: [0.0, 0.0, 6.0], target: [0.0; 3], up: up(), vertical_fov: 36.0 },
             meshes: vec![mesh("square", [0.0; 3], 3.6)],
             plane: None,
-            point_lights: vec![PointLight { position: [-4.0, 5.0, 5.0], intensity: [25.0; 3] }],
+            // Soft light from all around, of about the same colour everywhere.
+            environment: Some(EnvironmentLight { scale: 2.9, ..EnvironmentLight::of("studio") }),
             ..Self::blobs()
         }
     }

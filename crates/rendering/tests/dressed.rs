@@ -1,11 +1,13 @@
 //! Several materials in one picture.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use lookmatch_imaging::Image;
+use lookmatch_imaging::{Image, luminance};
 use lookmatch_materials::Material;
 use lookmatch_rendering::{
-    Camera, EnvironmentLight, Illumination, Mesh, Part, PathTracer, PointLight, Render, Scene, Sphere, Spot,
+    Camera, EnvironmentLight, Illumination, Mesh, Part, PathTracer, Plane, PointLight, Render, Renderer,
+    Scene, Sphere, Spot,
 };
 
 const SIZE: usize = 32;
@@ -46,7 +48,7 @@ fn one_material_is_the_plain_picture() {
     let tracer = PathTracer::prepare(&Scene::spheres(), Illumination::All, SIZE, 16, 3).unwrap();
     let plastic = material("ggx:roughness=0.1,diffuse=0.3");
     let plain = tracer.render(&plastic, Part::Full);
-    assert!(tracer.render_dressed(&[plastic.clone()], &|_| 0, Part::Full) == plain);
+    assert!(tracer.render_dressed(std::slice::from_ref(&plastic), &|_| 0, Part::Full) == plain);
     let twins = [plastic.clone(), plastic];
     assert!(tracer.render_dressed(&twins, &|spot| spot.subject % 2, Part::Full) == plain);
 }
@@ -151,4 +153,80 @@ fn faults_of_shapes() {
     let packed = folder.path().join("torn.obj.gz");
     std::fs::write(&packed, "no gzip").unwrap();
     refused(packed.to_str().unwrap(), &["torn.obj.gz", "no OBJ file"]);
+}
+
+/// Under every map, balanced, a white table is equally bright.
+#[test]
+fn balanced_maps_light_a_table_alike() {
+    let mut radiance = Vec::new();
+    for name in EnvironmentLight::names() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = Plane { height: 0.0, half_extent: 3.0, check_size: 1.0, light: [0.9; 3], dark: [0.9; 3] };
+        let scene = Scene {
+            camera: Camera { eye: [0.0, 20.0, 0.0], up: [0.0, 0.0, -1.0], ..white(folder.path()).camera },
+            plane: Some(table),
+            // A scene has a subject: far below, it is neither seen nor shades the table.
+            spheres: vec![Sphere { centre: [0.0, -900.0, 0.0], radius: 0.1, diffuse: None }],
+            environment: Some(EnvironmentLight::balanced(name).unwrap()),
+            ..white(folder.path())
+        };
+        let tracer = PathTracer::prepare(&scene, Illumination::Environment, 4, 4096, 1).unwrap();
+        let picture = tracer.render(&material("lambert"), Part::Full);
+        radiance.push((name, f64::from(luminance(picture.get(1, 1)))));
+    }
+    assert_eq!(radiance.len(), 7);
+    let wanted = radiance[1].1;
+    assert!(wanted > 0.5 && wanted < 1.5, "interior is just white: {wanted}");
+    assert!(radiance.iter().all(|(_, seen)| (seen / wanted - 1.0).abs() < 0.02), "{radiance:?}");
+}
+
+/// Every built-in scene shows its subjects, and none in vain: a black material darkens the picture.
+#[test]
+fn built_in_scenes_show_their_subjects() {
+    for name in ["blobs", "checker-wall", "spot", "shader-ball"] {
+        let scene = Scene::load(name).unwrap();
+        for light in [Illumination::Point, Illumination::Environment] {
+            let tracer = PathTracer::prepare(&scene, light, SIZE, 8, 1).unwrap();
+            let [black, white] =
+                ["0", "0.9"].map(|d| tracer.render(&material(&format!("lambert:diffuse={d}")), Part::Full));
+            let subject = |k: &usize| black.pixels()[*k] == [0.0; 3] && white.pixels()[*k][1] > 0.02;
+            let share = (0..SIZE * SIZE).filter(subject).count() as f64 / (SIZE * SIZE) as f64;
+            assert!((0.1..0.95).contains(&share), "{name} {light:?}: {share}");
+            let brightest = white.pixels().iter().flatten().copied().fold(0.0, f32::max);
+            assert!(brightest.is_finite() && brightest > 0.05, "{name} {light:?}: {brightest}");
+        }
+    }
+}
+
+#[test]
+fn spheres_of_the_fast_renderer_wear_their_own() {
+    let scene = Scene::spheres().for_model(material("ggx-conductor").model());
+    let renderer = Renderer::prepare(&scene, Illumination::Point, 48).unwrap().keep_transport();
+    let materials =
+        ["ggx-conductor:roughness=0.1", "lambert:diffuse=0.5", "ward:roughness=0.3"].map(material);
+    let refs = materials.each_ref();
+    let alike = renderer.render_dressed(&[refs[0]; 3], Part::Full);
+    let plain = renderer.render(refs[0], Part::Full);
+    let largest = |a: &Image, b: &Image| {
+        let pairs = a.pixels().iter().flatten().zip(b.pixels().iter().flatten());
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    assert!(largest(&alike, &plain) < 1e-5, "{}", largest(&alike, &plain));
+    let pictures = renderer.render_dressed_batch(&refs, &[vec![0, 1, 2], vec![2, 1, 0]], Part::Full);
+    assert!(pictures[0] == renderer.render_dressed(&refs, Part::Full));
+    // The middles of the three spheres.
+    for (wears, picture) in [[0, 1, 2], [2, 1, 0]].iter().zip(&pictures) {
+        for (number, x) in wears.iter().zip([8, 24, 39]) {
+            let alone = renderer.render(refs[*number], Part::Full);
+            assert!(picture.get(x, 23) == alone.get(x, 23), "{number} at {x}");
+        }
+    }
+    let alone = catch_unwind(AssertUnwindSafe(|| renderer.render_dressed(&refs[..1], Part::Full)));
+    assert!(alone.is_err(), "one material for three spheres");
+    // What lies before a sphere is nearer to its own picture than to that of any other.
+    let board = |picture: &Image, x: usize| f64::from(picture.get(x, 36)[1]);
+    let [metal, matt] = [0, 1].map(|k| renderer.render(refs[k], Part::Full));
+    assert!(
+        (board(&pictures[0], 8) - board(&metal, 8)).abs() < (board(&pictures[0], 8) - board(&matt, 8)).abs()
+    );
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lookmatch_imaging::Image;
-use lookmatch_rendering::{EnvironmentLight, Illumination, Renderer, Scene, SceneError};
+use lookmatch_rendering::{EnvironmentLight, EnvironmentMap, Illumination, Renderer, Scene, SceneError};
 
 const GOOD: &str = "[camera]
 eye = [0, 0, 6]
@@ -55,6 +55,25 @@ fn spheres_hold_neither_each_other_nor_the_camera() {
     fails("radius = 1", twin, &["sphere[1].centre", "apart from the other spheres"]);
 }
 
+const BUILT_IN: [&str; 6] = ["reference", "spheres", "blobs", "checker-wall", "spot", "shader-ball"];
+
+#[test]
+fn maps_are_files_or_names() {
+    for name in EnvironmentLight::names() {
+        assert!(EnvironmentMap::load(&EnvironmentLight::of(name)).is_ok(), "{name}");
+    }
+    let message = EnvironmentMap::load(&EnvironmentLight::of("citty")).unwrap_err().to_string();
+    assert!(
+        message.contains("'citty'") && message.contains(".exr") && message.contains("city, forest"),
+        "{message}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("black.exr");
+    lookmatch_imaging::write(&file, &Image::new(16, 8), &[]).unwrap();
+    let message = EnvironmentLight::balanced(file.to_str().unwrap()).unwrap_err().to_string();
+    assert!(message.contains("black.exr") && message.contains("no light from above"), "{message}");
+}
+
 #[test]
 fn a_good_scene_is_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -66,7 +85,9 @@ fn a_good_scene_is_read() {
 #[test]
 fn built_in_scenes_survive_their_own_format() {
     let folder = tempfile::tempdir().unwrap();
-    for scene in [Scene::reference(), Scene::spheres()] {
+    for name in BUILT_IN {
+        let scene = Scene::load(name).unwrap();
+        assert_eq!(scene.name, name);
         assert_eq!(load(folder.path(), &toml::to_string(&scene).unwrap()).unwrap(), scene);
     }
 }
@@ -75,10 +96,7 @@ fn built_in_scenes_survive_their_own_format() {
 fn files() {
     let message = Scene::load("/nowhere/kitchen.toml").unwrap_err().to_string();
     assert!(message.contains("cannot read scene '/nowhere/kitchen.toml'"), "{message}");
-    assert!(
-        message.contains("reference") && message.contains("spheres"),
-        "names what is built in: {message}"
-    );
+    assert!(BUILT_IN.iter().all(|name| message.contains(name)), "names what is built in: {message}");
     fails("[camera]", "[camera", &["kitchen.toml", "line 1"]);
     fails("vertical_fov = 28", "vertical_fov = wide", &["kitchen.toml", "line 4"]);
     fails("radius", "raduis", &["kitchen.toml", "raduis", "radius"]);

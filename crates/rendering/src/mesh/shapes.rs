@@ -89,7 +89,7 @@ fn blob(seed: u64) -> Soup {
 
 /// The radius of a blob, `exp Σ g P_l(d · n)` in the direction n, with random directions d, as many of each degree l as it has
 /// harmonics. By the addition theorem that is a random sum of the real spherical harmonics of these degrees, alike
-/// in all directions. The weights g fall with the degree as l^(−3/2).
+/// in all directions. The weights g fall with the degree as 1/l.
 struct Relief {
     /// Degree l, direction d and weight g.
     parts: Vec<(usize, DVec3, f64)>,
@@ -100,7 +100,7 @@ impl Relief {
         let mut random = Pcg64::seed_from_u64(seed);
         let mut even = move || 2.0 * random.random::<f64>() - 1.0;
         // Each degree then has the variance of its amplitude: a Legendre polynomial's is 1/(2l + 1), that of even numbers 1/3.
-        let amplitude = |l: usize| (l as f64).powf(-1.5);
+        let amplitude = |l: usize| (l as f64).recip();
         let whole = DEGREES.map(|l| amplitude(l).powi(2)).sum::<f64>().sqrt();
         let degrees = DEGREES.flat_map(|l| std::iter::repeat_n(l, 2 * l + 1));
         let part = |l: usize| {

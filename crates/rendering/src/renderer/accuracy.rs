@@ -111,7 +111,8 @@ fn dressed_spheres() {
     let renderer = Renderer::prepare(&scene, Illumination::All, SIZE).unwrap();
     let (pixels, board) = (some_pixels(&renderer), board_pixels(&renderer));
     let renderer = thinned(&scene, renderer, &pixels);
-    let tracer = PathTracer::prepare(&scene, Illumination::All, SIZE, SAMPLES, 1).unwrap();
+    // Few paths: what is compared has the same noise.
+    let tracer = PathTracer::prepare(&scene, Illumination::All, SIZE, SAMPLES / 4, 1).unwrap();
     for roughness in [0.2, 0.05] {
         let materials = metals.map(|metal| material(&format!("ggx-conductor:{metal},roughness={roughness}")));
         let picture = renderer.render_dressed(&materials.each_ref(), Part::Full);
