@@ -77,7 +77,7 @@ fn room(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (min, max) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     match max - min {
         span if span > 0.0 => min - 0.05 * span..max + 0.05 * span,
-        span if span == 0.0 => min - 0.5..max + 0.5,
+        0.0 => min - 0.5..max + 0.5,
         _ => 0.0..1.0,
     }
 }
