@@ -99,6 +99,7 @@ impl CrossMatch<'_> {
         let rendered = |(point, look): &(&Point, &Look)| Rendered {
             point: (*point).clone(),
             pictures: stage.pictures(look, with_diffuse),
+            noise: stage.noise(look, with_diffuse),
         };
         let rendered: Vec<Rendered> = new.iter().map(rendered).collect();
         let mix =
