@@ -129,7 +129,7 @@ impl Case {
             comparisons: self.comparisons(&album, &renderer, &probe)?,
             figures: vec![self.figure(&album, &probe, &taken, &best)?],
             notes: vec![
-                "Light that the three metals throw onto the checkerboard is averaged over them; they do not see each other.".into(),
+                "The spheres do not show each other's highlights: the fast renderer leaves those out, of sources and targets alike.".into(),
             ],
             ..Report::default()
         })

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use lookmatch_imaging::Verdict;
 use lookmatch_imaging::{Image, error_map, write};
 use lookmatch_reproduce::{
-    Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table, Verdict, pictures,
+    Bar, Cell, Comparison, Environment, Figure, Finding, Picture, Report, Row, Run, Table, pictures,
 };
 
 /// Side of the pictures in pixels.
