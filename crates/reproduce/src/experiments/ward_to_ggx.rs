@@ -28,6 +28,11 @@ const PICTURED: [[f64; 2]; 2] = [[0.2, 0.31], [0.2, 0.01]];
 /// Targets that are rendered at once where all are.
 const BATCH: usize = 64;
 
+/// What one of its probes is called, for other experiments as well.
+pub(super) fn probe_name(name: &str) -> String {
+    format!("{NAME}-{name}")
+}
+
 /// The plan of one of its probes.
 pub(super) fn plan(
     setting: &Setting,
@@ -51,7 +56,7 @@ pub(super) fn plan(
 pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report> {
     let paper = Some(Preset::Paper);
     let probe = |name: &str, strategy, preset, search: &str| -> anyhow::Result<Found> {
-        found(setting, watch, &format!("{NAME}-{name}"), &plan(setting, strategy, preset, search)?)
+        found(setting, watch, &probe_name(name), &plan(setting, strategy, preset, search)?)
     };
     let brute = probe("brute-force", Strategy::Unconstrained, paper, "exhaustive")?;
     let alone = probe("unconstrained", Strategy::Unconstrained, paper, "genetic")?;
@@ -146,7 +151,7 @@ fn split_by_index(setting: &Setting, watch: &dyn Watch, probe: &Probe) -> anyhow
 }
 
 /// Side of the pictures.
-fn size(setting: &Setting) -> usize {
+pub(super) fn size(setting: &Setting) -> usize {
     if setting.is_quick { 128 } else { 300 }
 }
 
