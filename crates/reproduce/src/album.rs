@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use lookmatch_imaging::{Image, Mask, Verdict, error_map, error_scale, jod, nrmsd, write};
 
+use crate::tables::channel_mean;
 use crate::{Comparison, Picture, Setting};
 
 /// The pictures of one experiment.
@@ -58,7 +59,7 @@ impl Album {
         let (map, _) = error_map(&source.image, &other.image, Some(scale))?;
         let error_file = self.write(&format!("{key}-{}-error", slug(other.title)), &map)?;
         let jod = jod(&source.image, &other.image)?;
-        let nrmsd = nrmsd(&source.image, &other.image, None)?.iter().sum::<f64>() / 3.0;
+        let nrmsd = channel_mean(nrmsd(&source.image, &other.image, None)?);
         Ok(Picture {
             error_file: Some(error_file),
             nrmsd: Some(nrmsd),

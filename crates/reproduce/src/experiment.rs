@@ -44,6 +44,13 @@ pub struct Setting {
     pub cache: TransportCache,
 }
 
+impl Setting {
+    /// Side of the pictures that judge, in pixels.
+    pub(crate) fn size(&self) -> usize {
+        if self.is_quick { 128 } else { 300 }
+    }
+}
+
 /// Who is told how far an experiment is, and may stop it.
 pub trait Watch: Sync {
     /// A part of the experiment begins: what, and in how many steps.

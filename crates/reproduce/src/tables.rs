@@ -64,6 +64,11 @@ pub(crate) fn bar(name: String, value: f64, bar: Bar, cause: &str) -> Finding {
     finding
 }
 
+/// The mean of red, green and blue.
+pub(crate) fn channel_mean(channels: [f64; 3]) -> f64 {
+    mean(channels.into_iter())
+}
+
 /// The mean of numbers.
 pub(crate) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0usize), |(sum, count), v| (sum + v, count + 1));

@@ -6,7 +6,7 @@ use lookmatch_plots::{Chart, Series, draw_charts};
 use lookmatch_remap::{Preset, Probe, Strategy, Validator};
 use rayon::prelude::*;
 
-use super::ward_to_ggx::{plan, probe_name, size};
+use super::ward_to_ggx::{plan, probe_name};
 use crate::album::Album;
 use crate::probes::found;
 use crate::tables::mean;
@@ -54,7 +54,7 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
             "{} Ward plastics and their GGX matches on three spheres, {} pixels a side, looked at by ColorVideoVDP. The paper's observers saw \
              differences for roughnesses up to {SMOOTH} or specular reflectances from {BRIGHT} on, and none elsewhere.",
             limited.len(),
-            size(setting)
+            setting.size()
         ),
         tables: vec![
             confusion("Agreement where any visible difference counts", &limited, Verdict::SlightlyDifferent),
@@ -78,12 +78,14 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
 /// What would be seen of all matches of a probe.
 fn points(setting: &Setting, watch: &dyn Watch, probe: &Probe) -> anyhow::Result<Vec<Point>> {
     watch.begin("light of the spheres", 0);
-    let validator = Validator::cached(probe, &None, size(setting), &setting.cache, &|_| ())?;
+    let validator = Validator::cached(probe, &None, setting.size(), &setting.cache, &|_| ())?;
     watch.begin("looking", probe.entries.len());
     let look = |place: usize| -> anyhow::Result<Point> {
         anyhow::ensure!(!watch.is_stopped(), "stopped");
         let (source, targets) = validator.materials(place)?;
-        let target = targets[0].as_ref().expect("a probe has a target for each of its entries");
+        let Some(Some(target)) = targets.first() else {
+            anyhow::bail!("the probe has no target for {source}")
+        };
         let images = validator.render(&[&source, target]);
         let values = &probe.entries[place].source;
         watch.advance(1);

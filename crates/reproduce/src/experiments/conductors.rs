@@ -1,6 +1,7 @@
 //! Section 5.1: Ashikhmin-Shirley metals as Cook-Torrance (Beckmann) and as GGX ones. The map is found on iridium and judged on gold,
 //! silver and copper spheres.
 
+use anyhow::Context;
 use lookmatch_imaging::{Image, nrmsd};
 use lookmatch_materials::Material;
 use lookmatch_plots::{Chart, Series, draw_charts};
@@ -10,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::album::{Album, Shown};
 use crate::probes::found;
-use crate::tables::{Published, bar, mean, nrmsd_bars, nrmsd_table};
+use crate::tables::{Published, bar, channel_mean, mean, nrmsd_bars, nrmsd_table};
 use crate::{Bar, Cell, Figure, Report, Row, Setting, Table, Watch};
 
 /// Table 2, left.
@@ -62,10 +63,6 @@ fn picture(renderer: &Renderer, model: &str, roughness: f64) -> anyhow::Result<I
     Ok(renderer.render_dressed(&materials.each_ref(), Part::Full))
 }
 
-fn channel_mean(channels: [f64; 3]) -> f64 {
-    channels.iter().sum::<f64>() / 3.0
-}
-
 impl Case {
     fn run(&self, setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report> {
         let model = lookmatch_materials::by_name;
@@ -74,7 +71,7 @@ impl Case {
             Plan::between(Endpoint::Model(model("as")?), Endpoint::Model(model(self.target)?), &options)?;
         let probe = found(setting, watch, self.name, &plan)?.probe;
 
-        let size = if setting.is_quick { 128 } else { 300 };
+        let size = setting.size();
         watch.begin("light of the spheres", 0);
         let scene = Scene::spheres().for_model(probe.from.model());
         let renderer = Renderer::cached(&scene, Illumination::All, size, &setting.cache, &|_| ())?;
@@ -143,10 +140,12 @@ impl Case {
     ) -> anyhow::Result<Vec<crate::Comparison>> {
         let nearest = |wanted: &f64| {
             let off = |e: &lookmatch_remap::Entry| (e.source[0] - wanted).abs();
-            probe.entries.iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("a probe has entries")
+            let nearest = probe.entries.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            nearest.context("the probe has no entries")
         };
         let mut comparisons = Vec::new();
-        for (k, entry) in PICTURED.iter().map(nearest).enumerate() {
+        for (k, wanted) in PICTURED.iter().enumerate() {
+            let entry = nearest(wanted)?;
             let shown = |title, model: &str, roughness: f64| -> anyhow::Result<Shown> {
                 let material = format!("{model}:conductor=gold|silver|copper,roughness={roughness}");
                 Ok(Shown { title, material, image: picture(renderer, model, roughness)? })
@@ -164,7 +163,7 @@ impl Case {
             )?);
         }
         // Figure 8: the metal that the map was found on.
-        let entry = nearest(&PICTURED[1]);
+        let entry = nearest(&PICTURED[1])?;
         let iridium = |title, model: &str, roughness: f64| -> anyhow::Result<Shown> {
             let text = format!("{model}:conductor=iridium,roughness={roughness}");
             let material = Material::parse(&text)?;

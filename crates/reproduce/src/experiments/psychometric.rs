@@ -7,7 +7,6 @@ use lookmatch_remap::{Endpoint, Options, Plan, Probe, Side, Vary, apply};
 use lookmatch_rendering::{EnvironmentLight, Illumination, Part, Renderer, Scene};
 use rayon::prelude::*;
 
-use super::ward_to_ggx::size;
 use crate::album::Album;
 use crate::probes::found;
 use crate::tables::bar;
@@ -57,7 +56,7 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
     let probe = found(setting, watch, "psychometric", &plan(setting)?)?.probe;
     watch.begin("light of the sphere", 0);
     let scene = Scene { environment: Some(EnvironmentLight::balanced(LIGHT)?), ..Scene::reference() };
-    let renderer = Renderer::cached(&scene, Illumination::All, size(setting), &setting.cache, &|_| ())?;
+    let renderer = Renderer::cached(&scene, Illumination::All, setting.size(), &setting.cache, &|_| ())?;
     let points: Vec<(f64, f64)> = SPECULAR.iter().flat_map(|s| ROUGHNESS.map(|r| (*s, r))).collect();
     watch.begin("ranking neighbours", points.len());
     let rank = |point: &(f64, f64)| -> anyhow::Result<[Ranking; 2]> {
@@ -119,7 +118,7 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
         about: format!(
             "For the paper's 25 Ward plastics (bodies {BODY}), the probe's GGX match and its four neighbours to each side, first in index and then \
              in roughness, are ranked by their JOD beside the source: a sphere under the map '{LIGHT}' and a lamp, {} pixels a side.",
-            size(setting)
+            setting.size()
         ),
         findings: findings.collect(),
         tables: vec![Table {
@@ -149,7 +148,7 @@ fn plan(setting: &Setting) -> anyhow::Result<Plan> {
     let options = Options {
         seed: setting.seed,
         mask: true,
-        size: Some(size(setting)),
+        size: Some(setting.size()),
         vary: vec![vary("specular", 0.065, 0.325, 0.065), vary("roughness", 0.01, 0.61, 0.04)],
         ..Options::default()
     };

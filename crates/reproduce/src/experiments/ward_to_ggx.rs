@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::album::{Album, Shown};
 use crate::probes::{Found, found};
-use crate::tables::{Published, bar, mean, nrmsd_bars, nrmsd_table};
+use crate::tables::{Published, bar, channel_mean, mean, nrmsd_bars, nrmsd_table};
 use crate::{Bar, Cell, Comparison, Figure, Finding, Report, Row, Setting, Table, Watch};
 
 const NAME: &str = "ward-to-ggx";
@@ -127,7 +127,7 @@ const INDEX: &str = "the index ends at 1.85, a reflectance of 0.089 at normal in
 
 /// What the limit of the index costs: sources that it can show, and those that it cannot.
 fn split_by_index(setting: &Setting, watch: &dyn Watch, probe: &Probe) -> anyhow::Result<Table> {
-    let validator = Validator::cached(probe, &None, size(setting), &setting.cache, &|_| ())?;
+    let validator = Validator::cached(probe, &None, setting.size(), &setting.cache, &|_| ())?;
     let limit = f0_from_ior(HIGHEST);
     let mut rows = Vec::new();
     for (name, is_shown) in [("up to 0.089", true), ("above", false)] {
@@ -150,15 +150,10 @@ fn split_by_index(setting: &Setting, watch: &dyn Watch, probe: &Probe) -> anyhow
     })
 }
 
-/// Side of the pictures.
-pub(super) fn size(setting: &Setting) -> usize {
-    if setting.is_quick { 128 } else { 300 }
-}
-
 /// The probe and its baselines in the validation scene.
 fn validated(setting: &Setting, watch: &dyn Watch, probe: &Probe) -> anyhow::Result<ValidationReport> {
     watch.begin("light of the spheres", 0);
-    let validator = Validator::cached(probe, &None, size(setting), &setting.cache, &|_| ())?;
+    let validator = Validator::cached(probe, &None, setting.size(), &setting.cache, &|_| ())?;
     let points = validation_points(probe, None);
     watch.begin("validating", points.len());
     Ok(validator.validate(&points, if setting.is_quick { 5 } else { 48 }, &|| watch.advance(1))?)
@@ -227,7 +222,7 @@ fn run_times(brute: &Found, alone: &Found, led: &Found) -> Table {
 /// Figure 9: source, both strategies, the free index and what people do without.
 fn comparisons(setting: &Setting, album: &Album, probes: [&Probe; 3]) -> anyhow::Result<Vec<Comparison>> {
     let titles = ["unconstrained", "constrained", "free index"];
-    let validator = Validator::cached(probes[0], &None, size(setting), &setting.cache, &|_| ())?;
+    let validator = Validator::cached(probes[0], &None, setting.size(), &setting.cache, &|_| ())?;
     let one = |material: &Material| validator.render(&[material]).swap_remove(0);
     let mut all = Vec::new();
     for (k, wanted) in PICTURED.iter().enumerate() {
@@ -326,7 +321,7 @@ fn is_coarse(lattice: &Lattice, values: &[f64]) -> bool {
 
 /// Masked and whole NRMSD, mean of the channels.
 fn both(source: &Image, target: &Image, mask: &Mask) -> anyhow::Result<[f64; 2]> {
-    let of = |mask| nrmsd(source, target, mask).map(|channels| channels.iter().sum::<f64>() / 3.0);
+    let of = |mask| nrmsd(source, target, mask).map(channel_mean);
     Ok([of(Some(mask))?, of(None)?])
 }
 

@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use lookmatch_imaging::{Image, error_map, srgb_encode};
+use lookmatch_imaging::{Image, Verdict, error_map, srgb_encode};
 use maud::{Markup, html};
 
 use super::embedded;
 use crate::number::number;
 use crate::{Comparison, Picture};
-use lookmatch_imaging::Verdict;
 
 /// Colours that the scale of error maps is drawn with; the browser fills in those between.
 const STOPS: usize = 17;
