@@ -180,7 +180,8 @@ struct Step {
     files: Option<&'static str>,
     /// The rustup component that provides the subcommand, where a minimal toolchain lacks it.
     component: Option<&'static str>,
-    /// A program that the step cannot do without and nobody must have: where it is missing, the step is left out.
+    /// A program that the step cannot do without, which is the name of its Debian package as well: where it is missing and cannot be
+    /// installed, the step is left out.
     program: Option<&'static str>,
 }
 
@@ -193,10 +194,8 @@ impl Step {
     }
 
     fn run(&self) -> Result<(), String> {
-        if let Some(program) =
-            self.program.filter(|p| !succeeds(Command::new(p).arg("--version").stdout(Stdio::null())))
-        {
-            eprintln!("left out: it needs {program}, which is not installed");
+        if let Some(program) = self.program.filter(|program| !is_obtained(program)) {
+            eprintln!("left out: it needs {program}, which is not installed and could not be");
             return Ok(());
         }
         self.ensure_component()?;
@@ -228,6 +227,23 @@ impl Step {
              or, without rustup, from where Rust was installed"
         ))
     }
+}
+
+/// Whether a program is there, after an attempt to install it where it is not.
+fn is_obtained(program: &str) -> bool {
+    let answers = || succeeds(Command::new(program).arg("--version").stdout(Stdio::null()));
+    if answers() {
+        return true;
+    }
+    eprintln!("{program} is missing; trying: apt-get install {program}");
+    let apt = |arguments: &[&str]| {
+        let mut command = Command::new("apt-get");
+        command.args(arguments).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null());
+        succeeds(&mut command)
+    };
+    // The lists of a fresh machine are empty; those of another may do although they cannot be renewed.
+    apt(&["update", "--quiet"]);
+    apt(&["install", "--quiet", "--yes", "--no-install-recommends", program]) && answers()
 }
 
 /// The Rust files of a folder of the project.

@@ -28,7 +28,7 @@ const SHIPPED: [(&str, &[u8]); 6] = [
 ];
 
 /// The map that others are balanced to, and its scale such that a white surface on a table is just white.
-const BALANCE: (&str, f64) = ("interior", 0.35);
+pub(crate) const BALANCE: (&str, f64) = ("interior", 0.35);
 
 /// The map is cut in two this often to give the lights of irradiance: 8192 of them.
 const LIGHT_CUTS: u32 = 13;

@@ -1,5 +1,6 @@
 //! The scenes that need no file.
 
+use crate::environment::BALANCE;
 use crate::scene::up;
 use crate::{Camera, EnvironmentLight, Mesh, Plane, PointLight, Scene, Sphere};
 
@@ -52,8 +53,7 @@ impl Scene {
             meshes: Vec::new(),
             plane: Some(checkerboard(8.0)),
             point_lights: vec![PointLight { position: [-4.0, 5.0, 5.0], intensity: [25.0; 3] }],
-            // Scaled so that a white surface on the table is just white.
-            environment: Some(EnvironmentLight { scale: 0.35, ..EnvironmentLight::of("interior") }),
+            environment: Some(EnvironmentLight { scale: BALANCE.1, ..EnvironmentLight::of(BALANCE.0) }),
         }
     }
 

@@ -104,7 +104,8 @@ fn off_halfway(low: &Image, middle: &Image, high: &Image) -> f64 {
     let (off, change) = triples.fold((0.0, 0.0), |(off, change), [low, middle, high]| {
         (off + (middle - (low + high) / 2.0) * (high - low), change + (high - low).powi(2))
     });
-    off / change
+    // What shows nothing changes evenly.
+    if change == 0.0 { 0.0 } else { off / change }
 }
 
 fn ratio(what: &str, strength: f64, more: &Image, less: &Image, finding: &mut Finding) {
