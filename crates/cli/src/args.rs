@@ -262,7 +262,8 @@ pub(crate) struct RemapArgs {
     pub(crate) max_samples: Option<u32>,
     #[command(flatten)]
     pub(crate) renderers: RendererArgs,
-    /// Write tables and side-by-side pictures to this folder, and validate where both models are our own
+    /// Write tables and side-by-side pictures to this folder; where both models are our own, validate, and note in the probe what
+    /// anybody would see
     #[arg(long, value_name = "FOLDER")]
     pub(crate) report: Option<PathBuf>,
     /// The probe file
@@ -386,6 +387,10 @@ pub(crate) struct ValidateArgs {
     /// number, or all
     #[arg(long, value_name = "COUNT", default_value = "48", value_parser = metric_points)]
     pub(crate) metric_points: usize,
+    /// Write the verdict (would anybody see it?) at the source points into the probe, instead of those that it has: at up to 400 of
+    /// them, evenly spread, or at all that --points gives; `inspect --plot` draws it
+    #[arg(long)]
+    pub(crate) write: bool,
     /// Side of the pictures in pixels
     #[arg(long, default_value_t = 300)]
     pub(crate) size: usize,

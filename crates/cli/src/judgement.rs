@@ -4,7 +4,7 @@ use lookmatch_imaging::{
     Better, Image, METRICS, Mask, Metric, NO_DIFFERENCE, Reading, Verdict, read_metrics,
     share_choosing_correctly,
 };
-use lookmatch_remap::{MetricScores, Statistics, ValidationReport};
+use lookmatch_remap::{MethodVerdicts, MetricScores, Probe, Statistics, ValidationReport, VerdictMap};
 use serde_json::{Value as Json, json};
 
 use crate::output::{score, spinner, table};
@@ -97,6 +97,13 @@ pub(crate) fn validation_text(report: &ValidationReport) -> String {
         rows[0].extend([method.method.clone(), String::new()]);
         rows[1].extend(["whole", "masked"].map(str::to_owned));
     }
+    rows.extend(metric_rows(report));
+    format!("\n{}{}", table(&rows), viewing_text(report.metrics))
+}
+
+/// A row for each number of a metric and for each verdict: its name, then for each method what whole and masked pictures have.
+pub(crate) fn metric_rows(report: &ValidationReport) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
     let mean = |statistics: &Option<Statistics>| number(statistics.map(|s| s.mean));
     let first = report.methods.first().map_or(&[][..], |method| &method.metrics);
     for (k, MetricScores { title, .. }) in first.iter().enumerate() {
@@ -105,22 +112,77 @@ pub(crate) fn validation_text(report: &ValidationReport) -> String {
         rows.push(std::iter::once(title.clone()).chain(cells).collect());
     }
     for verdict in Verdict::ALL {
-        let count = |v: lookmatch_remap::Verdicts| match verdict {
-            Verdict::Indistinguishable => v.indistinguishable,
-            Verdict::SlightlyDifferent => v.slightly_different,
-            Verdict::NoticeablyDifferent => v.noticeably_different,
-        };
         let of = |method: &lookmatch_remap::MethodScores| {
-            [method.verdicts.map_or("-".to_owned(), |v| count(v).to_string()), String::new()]
+            [method.verdicts.map_or("-".to_owned(), |v| v.count(verdict).to_string()), String::new()]
         };
         let cells = report.methods.iter().flat_map(of);
         rows.push(std::iter::once(format!("points {}", verdict.title())).chain(cells).collect());
     }
-    format!("\n{}{}", table(&rows), viewing_text(report.metrics))
+    rows
 }
 
-/// How each metric looks at pictures; those that look alike share a line.
+/// What people would say over the source points of a probe, where it says so: a table for each light.
+pub(crate) fn verdicts_text(probe: &Probe) -> String {
+    let tables = probe.verdicts.iter().map(|map| {
+        let header = Verdict::ALL.map(Verdict::title).into_iter().chain(["mean JOD", "lowest", "at"]);
+        let mut rows = vec![std::iter::once("").chain(header).map(str::to_owned).collect::<Vec<_>>()];
+        for method in &map.methods {
+            let counts = Verdict::ALL.map(|verdict| method.counts().count(verdict).to_string());
+            let mut row = vec![format!("  {}", method.method)];
+            row.extend(counts);
+            row.push(format!("{:.2}", method.mean()));
+            if let Some((place, jod)) = method.worst() {
+                row.extend([format!("{jod:.2}"), point_text(probe, map.entries[place])]);
+            }
+            rows.push(row);
+        }
+        let VerdictMap { scene, environment, size, metric, viewing, entries, .. } = map;
+        format!(
+            "would anybody see it? At {} of {} source points, scene {scene}, environment {environment}, {size} px\n{}{}",
+            entries.len(),
+            probe.entries.len(),
+            table(&rows),
+            wrapped(&format!("{metric}: {viewing}")),
+        )
+    });
+    tables.collect::<Vec<_>>().join("\n")
+}
+
+/// Values of the source axes of an entry.
+fn point_text(probe: &Probe, entry: usize) -> String {
+    let values = probe.source_axes.iter().zip(&probe.entries[entry].source);
+    values.map(|(axis, value)| format!("{}={value}", axis.name)).collect::<Vec<_>>().join(",")
+}
+
+/// The same for machines.
+pub(crate) fn verdicts_json(probe: &Probe) -> Vec<Json> {
+    let method = |map: &VerdictMap, method: &MethodVerdicts| {
+        let worst = method.worst();
+        json!({
+            "method": method.method, "counts": method.counts(), "mean_jod": method.mean(),
+            "lowest_jod": worst.map(|worst| worst.1),
+            "lowest_at": worst.map(|worst| &probe.entries[map.entries[worst.0]].source),
+            "jod": method.jod, "verdict": method.verdict,
+        })
+    };
+    let told = |map: &VerdictMap| {
+        let VerdictMap { scene, environment, size, metric, viewing, entries, methods } = map;
+        json!({
+            "scene": scene, "environment": environment, "size": size, "metric": metric, "viewing": viewing,
+            "sources": entries.iter().map(|place| &probe.entries[*place].source).collect::<Vec<_>>(),
+            "methods": methods.iter().map(|m| method(map, m)).collect::<Vec<_>>(),
+        })
+    };
+    probe.verdicts.iter().map(told).collect()
+}
+
+/// How each metric looks at pictures, in lines.
 fn viewing_text(metrics: &[Metric]) -> String {
+    viewing_lines(metrics).iter().map(|(titles, viewing)| wrapped(&format!("{titles}: {viewing}"))).collect()
+}
+
+/// How each metric looks at pictures, after their names; those that look alike come together.
+pub(crate) fn viewing_lines(metrics: &[Metric]) -> Vec<(String, &'static str)> {
     let mut seen: Vec<(String, &str)> = Vec::new();
     for metric in metrics {
         match seen.iter_mut().find(|(_, viewing)| *viewing == metric.viewing) {
@@ -128,7 +190,7 @@ fn viewing_text(metrics: &[Metric]) -> String {
             None => seen.push((metric.title.to_owned(), metric.viewing)),
         }
     }
-    seen.iter().map(|(titles, viewing)| wrapped(&format!("{titles}: {viewing}"))).collect()
+    seen
 }
 
 /// A paragraph broken at spaces, its further lines indented.

@@ -4,35 +4,46 @@ use std::path::Path;
 
 use lookmatch_imaging::{Image, Mask, error_map, error_scale, write as write_image, write_atomically};
 use lookmatch_materials::Material;
+use lookmatch_plots::draw_probe;
 use lookmatch_remap::{
     Baseline, CrossStage, MethodScores, Probe, ValidationReport, Validator, validation_points,
 };
 use lookmatch_rendering::Illumination;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::commands::validate::{prepared, with_progress};
+use crate::commands::validate::{MAP_POINTS, Stop, prepared, verdicts_with_progress, with_progress};
+use crate::judgement::{metric_rows, validation_text, verdicts_text, viewing_lines};
 use crate::output::{bar, score, table};
 
 /// Side of the pictures in pixels.
 const SIZE: usize = 300;
+/// Source points that all metrics judge, as in `validate`.
+const METRIC_POINTS: usize = 48;
+/// The picture of the probe.
+const PLOT: &str = "probe.png";
 /// Matches of other renderers that are pictured: every picture is rendered for it.
 const PICTURED_ACROSS: usize = 4;
 /// Where on each source axis the pictured materials lie, as shares of its length.
 const PICTURED: [f64; 2] = [0.2, 0.75];
 
-/// Validates a probe and writes `index.html`, `validation.json`, `validation.txt` and the pictures.
-pub(crate) fn write(probe: &Probe, folder: &Path) -> anyhow::Result<ValidationReport> {
+/// Validates a probe, notes the verdicts in it, and writes `index.html`, `validation.json`, `validation.txt` and the pictures.
+pub(crate) fn write(probe: &mut Probe, folder: &Path, stop: Stop) -> anyhow::Result<ValidationReport> {
     let validator = prepared(probe, &None, SIZE)?;
-    let validation = with_progress(&validator, &validation_points(probe, None), 0)?;
-    let text = scores_table(&validation);
-    let file =
-        |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));
-    file("validation.json", &serde_json::to_string_pretty(&validation)?)?;
-    file("validation.txt", &text)?;
+    let validation = with_progress(&validator, &validation_points(probe, None), METRIC_POINTS, stop)?;
+    let map = verdicts_with_progress(&validator, &validation_points(probe, Some(MAP_POINTS)), stop)?;
     let mut strips = Vec::new();
     for (k, place) in pictured(probe).into_iter().enumerate() {
         strips.push(strip(&validator, place, &folder.join(format!("match-{k}.png")))?);
     }
+    probe.verdicts = vec![map];
+    if !probe.source_axes.is_empty() {
+        draw_probe(probe, &folder.join(PLOT))?;
+    }
+    let text = scores_table(&validation) + &validation_text(&validation) + "\n" + &verdicts_text(probe);
+    let file =
+        |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));
+    file("validation.json", &serde_json::to_string_pretty(&validation)?)?;
+    file("validation.txt", &text)?;
     file("index.html", &page(probe, &validation, &strips).into_string())?;
     eprint!("{text}");
     eprintln!("report in {}", folder.join("index.html").display());
@@ -218,6 +229,19 @@ fn page(probe: &Probe, validation: &ValidationReport, strips: &[Strip]) -> Marku
                 @else { "A baseline beats the probe on the mean masked NRMSD." }
             }
             (scores(validation))
+            h2 { "Would anybody see it?" }
+            p {
+                "Means over " (validation.metric_points) " source points, for whole pictures and with the mask. JOD: 10 where nothing \
+                 can be seen, 9 where 75 of 100 observers tell which is which. A verdict holds for the viewing conditions below."
+            }
+            (judged(validation))
+            @if !probe.source_axes.is_empty() {
+                h2 { "The probe" }
+                p {
+                    "What it gives for each source material, what is left, and at the bottom the verdict over the source parameters."
+                }
+                img src=(PLOT) alt="The probe's parameters, its error and the verdicts over the source parameters";
+            }
             h2 { "Side by side" }
             p { "Below each picture, its difference from the source, on one scale." }
             (figures(strips))
@@ -282,6 +306,20 @@ fn entries(probe: &Probe) -> Markup {
                 }
             }
         }
+    }
+}
+
+/// The metrics of the eye, and how they look at the pictures.
+fn judged(validation: &ValidationReport) -> Markup {
+    html! {
+        table {
+            tr { th {} @for method in &validation.methods { th colspan="2" { (method.method) } } }
+            tr { th {} @for _ in &validation.methods { th { "whole" } th { "masked" } } }
+            @for row in metric_rows(validation) {
+                tr { @for cell in row { td { (cell) } } }
+            }
+        }
+        ul { @for (titles, viewing) in viewing_lines(validation.metrics) { li { (titles) ": " (viewing) } } }
     }
 }
 

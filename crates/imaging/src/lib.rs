@@ -25,10 +25,10 @@ pub use lab::{lab_planes, lab_planes_of, squared_distance, weighted_squared_dist
 pub use metrics::Plane;
 pub use metrics::delta_e::{delta_e76_map, delta_e2000, delta_e2000_map};
 pub use metrics::distance_correlation::distance_correlation;
-pub use metrics::fitness::{Fitness, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
+pub use metrics::fitness::{Fitness, FitnessTerms, FitnessWeights, ProbeImages, ProbePixels, Reduce, Space};
 pub use metrics::flip::{PIXELS_PER_DEGREE as FLIP_PIXELS_PER_DEGREE, flip_map, hdr_flip_map};
 pub use metrics::gsm::{MEAN, gsm_map, gsm_of_greys};
-pub use metrics::jod::{VIEWING, jod};
+pub use metrics::jod::{MODEL_VERSION as JOD_MODEL_VERSION, VIEWING, jod};
 pub use metrics::luma::luma_255;
 pub use metrics::mask::{Mask, disc_weight};
 pub use metrics::nrmsd::{nrmsd, nrmsd_of_noise, nrmsd_pixels};

@@ -4,6 +4,7 @@ mod curves;
 mod error;
 mod probe;
 mod sheet;
+mod verdicts;
 
 pub use curves::{Chart, Series, draw_charts};
 pub use error::PlotError;

@@ -8,9 +8,10 @@ use std::path::Path;
 
 use crate::PlotError;
 use crate::sheet::{self, Area, Drawing, Drawn, short};
+use crate::verdicts;
 
 /// Size of a panel, of the colour bar in it, and of the title above all, in pixels.
-const PANEL: (u32, u32) = (430, 350);
+pub(crate) const PANEL: (u32, u32) = (430, 350);
 const BAR: u32 = 100;
 const TITLE: u32 = 64;
 /// Samples along each axis of a smooth function.
@@ -20,11 +21,11 @@ const SLICES: usize = 3;
 
 /// An axis of a panel: where its levels lie, and what they are called.
 #[derive(Clone)]
-struct Ruler {
-    label: String,
+pub(crate) struct Ruler {
+    pub(crate) label: String,
     is_log: bool,
     /// Positions of the levels.
-    centres: Vec<f64>,
+    pub(crate) centres: Vec<f64>,
 }
 
 /// Values over one or two axes, with the range of their colours.
@@ -50,6 +51,12 @@ impl Panel {
     }
 }
 
+/// What has a place of its own in a figure.
+enum Tile {
+    Values(Panel),
+    Verdicts(verdicts::Map),
+}
+
 /// Draws a probe into a .png or .svg file.
 ///
 /// # Errors
@@ -67,7 +74,7 @@ pub fn draw_probe(probe: &Probe, path: &Path) -> Result<(), PlotError> {
 /// A probe with its panels.
 struct Probed<'a> {
     probe: &'a Probe,
-    rows: Vec<Vec<Panel>>,
+    rows: Vec<Vec<Tile>>,
 }
 
 impl Drawing for Probed<'_> {
@@ -76,27 +83,32 @@ impl Drawing for Probed<'_> {
     }
 }
 
-/// The panels, by rows: the table and the fit, or slices of the table.
-fn rows(probe: &Probe) -> Result<Vec<Vec<Panel>>, PlotError> {
+/// All that is drawn, by rows: the table and the fit, or slices of the table; then the verdicts, where there are some.
+fn rows(probe: &Probe) -> Result<Vec<Vec<Tile>>, PlotError> {
     let axes = &probe.source_axes;
     // A plane of the two last axes; the others are cut.
     let shown = axes.len().saturating_sub(2)..axes.len();
-    let scales: Vec<Ruler> =
-        axes[shown.clone()].iter().map(|a| scale(&probe.from, a)).collect::<Result<_, _>>()?;
-    if axes.len() > 2 {
-        return slices(probe, &scales);
-    }
+    let scales: Vec<Ruler> = axes[shown].iter().map(|a| scale(&probe.from, a)).collect::<Result<_, _>>()?;
+    let slices = slices(probe);
+    let panels = if axes.len() > 2 { sliced(probe, &scales, &slices)? } else { whole(probe, &scales)? };
+    let values = panels.into_iter().map(|row| row.into_iter().map(Tile::Values).collect());
+    let seen = slices.iter().flat_map(|(at, places)| verdicts::rows(probe, &scales, places, at));
+    Ok(values.chain(seen.map(|row| row.into_iter().map(Tile::Verdicts).collect())).collect())
+}
+
+/// The table over one or two axes, and the fit.
+fn whole(probe: &Probe, scales: &[Ruler]) -> Result<Vec<Vec<Panel>>, PlotError> {
     let title = |k: usize, what: &str| format!("{} – {what}", label(&probe.to, &probe.target_axes[k].name));
     let mut first = Vec::new();
     for (k, axis) in probe.target_axes.iter().enumerate() {
         let mut panel =
-            panel(probe, &scales, &all(probe), title(k, "table"), target(probe, axis)?, &|e| e.target[k]);
+            panel(probe, scales, &all(probe), title(k, "table"), target(probe, axis)?, &|e| e.target[k]);
         if scales.len() == 1 {
             (panel.title, panel.curve) = (title(k, &form(probe, k)), curve(probe, &scales[0], k));
         }
         first.push(panel);
     }
-    first.push(errors(probe, &scales, &all(probe), ""));
+    first.push(errors(probe, scales, &all(probe), ""));
     let Some(fit) = probe.fit.as_ref().filter(|_| scales.len() == 2) else { return Ok(vec![first]) };
     let mut second = Vec::new();
     for (k, parameter) in fit.parameters.iter().enumerate() {
@@ -105,7 +117,7 @@ fn rows(probe: &Probe) -> Result<Vec<Vec<Panel>>, PlotError> {
         let at = |place: usize| -> Vec<f64> {
             [fine[0][place / FINE], fine[1][place % FINE]]
                 .iter()
-                .zip(&scales)
+                .zip(scales)
                 .map(|(t, s)| s.value(*t))
                 .collect()
         };
@@ -118,29 +130,40 @@ fn rows(probe: &Probe) -> Result<Vec<Vec<Panel>>, PlotError> {
     Ok(if second.is_empty() { vec![first] } else { vec![first, second] })
 }
 
-/// Rows at some levels of the axis before the last two, the middle levels of all axes before it.
-fn slices(probe: &Probe, scales: &[Ruler]) -> Result<Vec<Vec<Panel>>, PlotError> {
-    let cut = probe.source_axes.len() - 2;
-    let count = probe.source_axes[cut - 1].len();
+/// Where the last two axes are shown: everywhere, or at some levels of the axis before them and the middle levels of all before it. In
+/// words, and the places of the entries.
+fn slices(probe: &Probe) -> Vec<(String, Vec<usize>)> {
+    let cut = probe.source_axes.len().saturating_sub(2);
+    let Some(last) = cut.checked_sub(1) else { return vec![(String::new(), all(probe))] };
+    let count = probe.source_axes[last].len();
     let mut levels: Vec<usize> = (0..SLICES).map(|k| k * (count - 1) / (SLICES - 1)).collect();
     levels.dedup();
-    let row = |level: &usize| -> Result<Vec<Panel>, PlotError> {
+    let slice = |level: usize| {
         let mut at: Vec<f64> = probe.source_axes[..cut].iter().map(|a| a.value(a.len() / 2)).collect();
-        at[cut - 1] = probe.source_axes[cut - 1].value(*level);
-        let places: Vec<usize> =
-            (0..probe.entries.len()).filter(|p| probe.entries[*p].source[..cut] == at[..]).collect();
-        let names =
-            probe.source_axes[..cut].iter().zip(&at).map(|(a, v)| format!("{} {}", a.name, short(*v)));
-        let names: Vec<String> = names.collect();
+        at[last] = probe.source_axes[last].value(level);
+        let places = (0..probe.entries.len()).filter(|p| probe.entries[*p].source[..cut] == at[..]);
+        let names = probe.source_axes.iter().zip(&at).map(|(a, v)| format!("{} {}", a.name, short(*v)));
+        (format!(" at {}", names.collect::<Vec<_>>().join(", ")), places.collect())
+    };
+    levels.into_iter().map(slice).collect()
+}
+
+/// The table at some slices, a row each.
+fn sliced(
+    probe: &Probe,
+    scales: &[Ruler],
+    slices: &[(String, Vec<usize>)],
+) -> Result<Vec<Vec<Panel>>, PlotError> {
+    let row = |(at, places): &(String, Vec<usize>)| -> Result<Vec<Panel>, PlotError> {
         let mut panels = Vec::new();
         for (k, axis) in probe.target_axes.iter().enumerate() {
-            let title = format!("{} at {}", label(&probe.to, &axis.name), names.join(", "));
-            panels.push(panel(probe, scales, &places, title, target(probe, axis)?, &|e| e.target[k]));
+            let title = format!("{}{at}", label(&probe.to, &axis.name));
+            panels.push(panel(probe, scales, places, title, target(probe, axis)?, &|e| e.target[k]));
         }
-        panels.push(errors(probe, scales, &places, &format!(" at {}", names.join(", "))));
+        panels.push(errors(probe, scales, places, at));
         Ok(panels)
     };
-    levels.iter().map(row).collect()
+    slices.iter().map(row).collect()
 }
 
 fn all(probe: &Probe) -> Vec<usize> {
@@ -212,12 +235,12 @@ impl Ruler {
         if self.is_log { value.log10() } else { value }
     }
 
-    fn value(&self, position: f64) -> f64 {
+    pub(crate) fn value(&self, position: f64) -> f64 {
         if self.is_log { 10f64.powf(position) } else { position }
     }
 
     /// The ends of the levels' cells: halfway between them, and as far beyond the outer ones.
-    fn edges(&self) -> Vec<f64> {
+    pub(crate) fn edges(&self) -> Vec<f64> {
         let c = &self.centres;
         if c.len() == 1 {
             return vec![c[0] - 0.5, c[0] + 0.5];
@@ -250,7 +273,7 @@ fn curve(probe: &Probe, scale: &Ruler, k: usize) -> Vec<(f64, f64)> {
     }
 }
 
-fn figure<B: DrawingBackend>(probe: &Probe, root: &Area<B>, rows: &[Vec<Panel>], scale: u32) -> Drawn {
+fn figure<B: DrawingBackend>(probe: &Probe, root: &Area<B>, rows: &[Vec<Tile>], scale: u32) -> Drawn {
     let told = |e: DrawingAreaErrorKind<B::ErrorType>| e.to_string();
     root.fill(&WHITE).map_err(told)?;
     let font = |size: u32| ("sans-serif", (size * scale) as f64).into_font();
@@ -275,13 +298,13 @@ fn figure<B: DrawingBackend>(probe: &Probe, root: &Area<B>, rows: &[Vec<Panel>],
     }
     let columns = rows.iter().map(Vec::len).max().unwrap_or(1);
     for (area, place) in body.split_evenly((rows.len(), columns)).iter().zip(0..) {
-        if let Some(panel) = rows[place / columns].get(place % columns) {
-            match panel.axes.len() {
-                1 => line(panel, area, scale),
-                _ => plane(panel, area, scale),
-            }
-            .map_err(told)?;
+        match rows[place / columns].get(place % columns) {
+            Some(Tile::Values(panel)) if panel.axes.len() == 1 => line(panel, area, scale),
+            Some(Tile::Values(panel)) => plane(panel, area, scale),
+            Some(Tile::Verdicts(map)) => verdicts::draw(map, area, scale),
+            None => Ok(()),
         }
+        .map_err(told)?;
     }
     root.present().map_err(told)
 }
@@ -356,7 +379,7 @@ fn plane<B: DrawingBackend>(
         .x_label_area_size(40 * scale)
         .y_label_area_size(54 * scale)
         .build_cartesian_2d(ends(&x), ends(&y))?;
-    mesh(&mut chart, panel, &panel.axes[1].label, &|t| short(panel.axes[1].value(t)), scale)?;
+    mesh(&mut chart, &panel.axes[0], &panel.axes[1].label, &|t| short(panel.axes[1].value(t)), scale)?;
     let rows = panel.axes[1].centres.len();
     chart.draw_series(panel.values.iter().enumerate().map(|(place, value)| {
         let (i, j) = (place / rows, place % rows);
@@ -424,7 +447,7 @@ fn line<B: DrawingBackend>(
         .y_label_area_size(64 * scale)
         .build_cartesian_2d(edges[0]..edges[edges.len() - 1], least..max + room)?;
     let what = panel.title.split([',', '–']).next().unwrap_or_default().trim().to_owned();
-    mesh(&mut chart, panel, &what, &|t| short(back(t)), scale)?;
+    mesh(&mut chart, axis, &what, &|t| short(back(t)), scale)?;
     let blue = RGBColor(49, 104, 142);
     let curve: Vec<(f64, f64)> = panel.curve.iter().map(|(t, v)| (*t, scaled(*v))).collect();
     chart.draw_series([PathElement::new(curve, blue.stroke_width(2 * scale))])?;
@@ -440,21 +463,20 @@ fn line<B: DrawingBackend>(
     Ok(())
 }
 
-type Chart<'a, B> = ChartContext<
+pub(crate) type Chart<'a, B> = ChartContext<
     'a,
     B,
     Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
 >;
 
-/// The axes of a panel with their names and numbers.
-fn mesh<B: DrawingBackend>(
+/// Axes with their names and numbers.
+pub(crate) fn mesh<B: DrawingBackend>(
     chart: &mut Chart<B>,
-    panel: &Panel,
+    x: &Ruler,
     y: &str,
     y_text: &dyn Fn(f64) -> String,
     scale: u32,
 ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-    let x = &panel.axes[0];
     chart
         .configure_mesh()
         .disable_mesh()

@@ -58,6 +58,7 @@ pub fn compose(first: &Probe, second: &Probe, clamp: bool) -> Result<Probe, Rema
         renderers,
         entries: places.iter().map(|place| entries[*place].clone()).collect(),
         fit: None,
+        verdicts: Vec::new(),
         derived: Some(Derived {
             kind: DerivedKind::Composition,
             of: vec![name(first), name(second)],

@@ -70,6 +70,9 @@ pub enum RemapError {
         /// All source points.
         total: usize,
     },
+    /// The user stopped work that leaves nothing behind.
+    #[error("interrupted")]
+    Stopped,
 }
 
 impl RemapError {

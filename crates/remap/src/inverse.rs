@@ -71,6 +71,7 @@ pub fn invert(probe: &Probe) -> Result<Probe, RemapError> {
         target_axes,
         entries: found.into_iter().map(|(entry, _)| entry).collect(),
         fit: None,
+        verdicts: Vec::new(),
         derived: Some(Derived {
             kind: DerivedKind::Inverse,
             of: vec![format!("{} -> {}", probe.from.model().name, probe.to.model().name)],

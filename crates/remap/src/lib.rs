@@ -8,6 +8,7 @@
 mod apply;
 mod baseline;
 mod carry;
+mod channels;
 mod compose;
 mod cross;
 mod cross_match;
@@ -35,11 +36,13 @@ mod studio;
 mod synthesis;
 mod table;
 mod validate;
+mod verdict_map;
 
 pub use lookmatch_search::Axis;
 
 pub use apply::{Applied, apply, apply_smoothly};
 pub use baseline::Baseline;
+pub use channels::{ChannelMatch, ChannelTable};
 pub use compose::{compose, measure};
 pub use cross::CrossStage;
 pub use error::RemapError;
@@ -59,8 +62,11 @@ pub use probe::{Derived, DerivedKind, Entry, Flag, Metric, Noise, Probe, RoundTr
 pub use stage::{Appearance, Stage};
 pub use strategy::{Event, remap, remap_across};
 pub use studio::{Counts, RendererRecord, Sampling, Shot, Studio};
-pub use synthesis::SynthesisRecord;
+pub use synthesis::{
+    PictureError, SynthesisExample, SynthesisQuality, SynthesisRecord, SynthesisStudy, study_synthesis,
+};
 pub use validate::{
     Lighting, MethodScores, MetricScores, Scores, Statistics, ValidationReport, Validator, Verdicts,
     validation_points,
 };
+pub use verdict_map::{MethodVerdicts, VerdictMap};

@@ -27,15 +27,19 @@ impl Pairing {
         let (from, to) = (roles(&plan.from, &plan.source_axes)?, roles(&plan.to, &plan.target_axes)?);
         let is_switch =
             |k: usize| to[k] == Role::SpecularReflectance && plan.target_axes[k].levels == [0.0, 1.0];
-        let followers = |role: &Role| -> Vec<(usize, Trend)> {
-            (0..to.len()).filter_map(|k| Some((k, role.trend(to[k])?))).collect()
+        // Of several source axes with one role, as `roughness_u` and `roughness_v`, each leads the one of its own name alone.
+        let is_twin = |role: &Role| from.iter().filter(|other| *other == role).count() > 1;
+        let followers = |role: &Role, name: &str| -> Vec<(usize, Trend)> {
+            let own = plan.target_axes.iter().position(|axis| is_twin(role) && axis.name == name);
+            let places = own.map_or(0..to.len(), |k| k..k + 1);
+            places.filter_map(|k| Some((k, role.trend(to[k])?))).collect()
         };
         let chosen = |source: &str| plan.pairs.iter().find(|pair| pair.source == source);
         let split = |switch: bool| -> Vec<Vec<(usize, Trend)>> {
             let of = |(role, axis): (&Role, &Axis)| {
                 let followers = match chosen(&axis.name) {
                     Some(pair) => pair.followers(&plan.target_axes, |k| role.trend(to[k])),
-                    None => followers(role),
+                    None => followers(role, &axis.name),
                 };
                 followers.into_iter().filter(|(k, _)| is_switch(*k) == switch).collect()
             };
@@ -150,4 +154,38 @@ fn guesses<'f>(
 /// `a + b − c`, no index below 0.
 fn combine(a: &Point, b: &Point, c: &Point) -> Point {
     a.iter().zip(b).zip(c).map(|((a, b), c)| (a + b).saturating_sub(*c)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Options;
+    use lookmatch_materials::by_name;
+
+    #[test]
+    fn twins_lead_their_own_kind_alone() {
+        let plan = |from: &str, to: &str, twins: bool| {
+            let (from, to) = (by_name(from).unwrap(), by_name(to).unwrap());
+            let mut plan = Plan::new(from, to, &Options::default()).unwrap();
+            let both = |axes: &mut Vec<Axis>| {
+                axes.retain(|axis| axis.name != "roughness");
+                axes.extend(
+                    ["roughness_u", "roughness_v"].map(|name| Axis::regular(name, 0.1, 0.5, 0.1).unwrap()),
+                );
+            };
+            both(&mut plan.target_axes);
+            if twins {
+                both(&mut plan.source_axes);
+            }
+            Pairing::new(&plan).unwrap().targets
+        };
+        let places = |followers: &[(usize, Trend)]| followers.iter().map(|(k, _)| *k).collect::<Vec<_>>();
+        // Targets: specular, index, both widths.
+        let brushed = plan("ward", "ggx", true);
+        assert_eq!([places(&brushed[1]), places(&brushed[2])], [[2], [3]]);
+        let tied = plan("ward", "ggx", false);
+        assert_eq!(places(&tied[1]), [2, 3], "one width leads both");
+        let exponent = plan("phong", "ggx", false);
+        assert!(exponent[1].contains(&(2, Trend::Falling)) && exponent[1].contains(&(3, Trend::Falling)));
+    }
 }

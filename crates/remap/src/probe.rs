@@ -14,6 +14,7 @@ use crate::options::{Pair, Preset, Strategy};
 use crate::plan::Plan;
 use crate::studio::{RendererRecord, Sampling};
 use crate::synthesis::SynthesisRecord;
+use crate::verdict_map::VerdictMap;
 use crate::{RemapError, plan};
 
 /// Version of the file format that is written; older ones are read, newer ones refused.
@@ -75,6 +76,9 @@ pub struct Probe {
     /// Its smooth form, where it was fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<Fit>,
+    /// What people would say to its targets, where they were judged: a map for each light.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub verdicts: Vec<VerdictMap>,
     /// One entry per source point, in lexicographic order of the source axes.
     pub entries: Vec<Entry>,
 }
@@ -264,6 +268,7 @@ impl Probe {
             totals: Totals { evaluations, lattice_points, rendered: None, synthesis: None },
             derived: None,
             fit: None,
+            verdicts: Vec::new(),
             entries,
         }
     }
@@ -420,6 +425,9 @@ impl Probe {
         }
         if let Some(place) = self.derived.iter().flat_map(|d| &d.unreachable).find(|p| **p >= expected) {
             return Err(format!("the field 'derived' speaks of entry {place}, which is not there"));
+        }
+        for (k, map) in self.verdicts.iter().enumerate() {
+            map.check(self).map_err(|e| format!("the field 'verdicts[{k}]': {e}"))?;
         }
         self.fit.as_ref().map_or(Ok(()), |fit| fit.check(self))
     }

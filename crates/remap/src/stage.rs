@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use lookmatch_imaging::{Fitness, Reduce, Space, lab_planes_of, squared_distance, weighted_squared_distance};
+use lookmatch_imaging::{
+    Fitness, FitnessTerms, Reduce, Space, lab_planes_of, squared_distance, weighted_squared_distance,
+};
 use lookmatch_materials::Material;
 use lookmatch_rendering::{
     DiffuseKey, Illumination, Observe, Part, Planes, Progress, Renderer, Scene, SplitLobes, TransportCache,
@@ -131,23 +133,45 @@ impl Stage {
 
     /// Eq. 3 of Guarnera *et al.* (2018) between two materials as they are seen.
     pub fn fitness(&self, a: &Appearance, b: &Appearance) -> f64 {
-        let w = &self.metric.weights;
-        let specular = w.specular
-            * (w.specular_point * self.rms(&a.specular.point, &b.specular.point)
-                + w.specular_environment * self.rms(&a.specular.environment, &b.specular.environment));
-        specular + self.diffuse_fitness(a, b)
+        self.metric.weights.sum(&self.terms(a, b))
+    }
+
+    /// The norms of Eq. 3, which any weights can be given to.
+    pub fn terms(&self, a: &Appearance, b: &Appearance) -> FitnessTerms {
+        FitnessTerms {
+            specular_point: self.rms(&a.specular.point, &b.specular.point),
+            specular_environment: self.rms(&a.specular.environment, &b.specular.environment),
+            ..self.diffuse_terms(a, b)
+        }
     }
 
     /// The part of Eq. 3 that the diffuse images make.
     pub(crate) fn diffuse_fitness(&self, a: &Appearance, b: &Appearance) -> f64 {
+        self.metric.weights.sum(&self.diffuse_terms(a, b))
+    }
+
+    fn diffuse_terms(&self, a: &Appearance, b: &Appearance) -> FitnessTerms {
         let (a, b) = (&a.diffuse, &b.diffuse);
         if Arc::ptr_eq(a, b) {
-            return 0.0;
+            return FitnessTerms::default();
         }
-        let w = &self.metric.weights;
-        let diffuse = w.diffuse_point * self.rms(&a.point, &b.point)
-            + w.diffuse_environment * self.rms(&a.environment, &b.environment);
-        w.diffuse * diffuse
+        FitnessTerms {
+            diffuse_point: self.rms(&a.point, &b.point),
+            diffuse_environment: self.rms(&a.environment, &b.environment),
+            ..FitnessTerms::default()
+        }
+    }
+
+    /// Squared distances of specular pictures under both lights: of a material as it is seen, and of a lobe times a scale, given its
+    /// linear planes.
+    pub(crate) fn scaled_squares(&self, seen: &Appearance, planes: &[Planes; 2], scale: f32) -> [f64; 2] {
+        let scaled =
+            |planes: &Planes| planes.each_ref().map(|plane| plane.iter().map(|v| v * scale).collect());
+        let squares = |seen: &[f32], planes| match &self.weights {
+            Some(weights) => weighted_squared_distance(seen, &lab(&scaled(planes)), weights),
+            None => squared_distance(seen, &lab(&scaled(planes))),
+        };
+        [squares(&seen.specular.point, &planes[0]), squares(&seen.specular.environment, &planes[1])]
     }
 
     /// The scene under the point light and under the environment.

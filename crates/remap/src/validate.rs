@@ -70,10 +70,31 @@ pub struct Verdicts {
     pub noticeably_different: usize,
 }
 
+impl Verdicts {
+    /// On pictures of some qualities, in JOD.
+    pub(crate) fn of(jods: &[f64]) -> Self {
+        let count = |verdict: Verdict| jods.iter().filter(|jod| Verdict::of(**jod) == verdict).count();
+        Self {
+            indistinguishable: count(Verdict::Indistinguishable),
+            slightly_different: count(Verdict::SlightlyDifferent),
+            noticeably_different: count(Verdict::NoticeablyDifferent),
+        }
+    }
+
+    /// The number of points with a verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        match verdict {
+            Verdict::Indistinguishable => self.indistinguishable,
+            Verdict::SlightlyDifferent => self.slightly_different,
+            Verdict::NoticeablyDifferent => self.noticeably_different,
+        }
+    }
+}
+
 /// One way to get a target material, judged.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MethodScores {
-    /// `probe`, `copy` or `copy, no Fresnel`.
+    /// One of [`Validator::methods`].
     pub method: String,
     /// Its scores.
     #[serde(flatten)]
@@ -105,10 +126,11 @@ pub struct ValidationReport {
     pub probe_is_best: bool,
 }
 
-/// Source points to validate at: all of them, or `count` evenly spread ones.
+/// Source points to validate at: all of them, or `count` evenly spread ones. Those whose entries failed have nothing to validate.
 pub fn validation_points(probe: &Probe, count: Option<usize>) -> Vec<usize> {
-    let total = probe.entries.len();
-    spread(total, count.unwrap_or(total).max(1))
+    let found = (0..probe.entries.len()).filter(|place| probe.entries[*place].failed.is_none());
+    let found: Vec<usize> = found.collect();
+    spread(found.len(), count.unwrap_or(usize::MAX).max(1)).into_iter().map(|k| found[k]).collect()
 }
 
 /// Some places of a list, evenly spread, in their order.
@@ -143,6 +165,14 @@ pub struct Validator<'a> {
 }
 
 impl<'a> Validator<'a> {
+    /// What a probe is called beside the baselines.
+    pub const PROBE: &'static str = "probe";
+
+    /// The names of all that is judged: the probe, then the baselines.
+    pub fn methods() -> impl Iterator<Item = &'static str> {
+        std::iter::once(Self::PROBE).chain(Baseline::ALL.map(Baseline::title))
+    }
+
     /// Prepares the scene for pictures of `size` × `size` pixels.
     ///
     /// # Errors
@@ -184,15 +214,31 @@ impl<'a> Validator<'a> {
         metric_points: usize,
         observe: &(dyn Fn() + Sync),
     ) -> Result<ValidationReport, RemapError> {
+        self.validate_until(points, metric_points, observe, &|| false)
+    }
+
+    /// [`Validator::validate`] unless `stop` says that it should end.
+    ///
+    /// # Errors
+    /// As there, and [`RemapError::Stopped`].
+    pub fn validate_until(
+        &self,
+        points: &[usize],
+        metric_points: usize,
+        observe: &(dyn Fn() + Sync),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<ValidationReport, RemapError> {
         let judged = spread(points.len(), metric_points);
         let row = |(k, place): (usize, &usize)| {
+            if stop() {
+                return Err(RemapError::Stopped);
+            }
             let row = self.score(*place, judged.binary_search(&k).is_ok());
             observe();
             row
         };
         let rows = points.par_iter().enumerate().map(row).collect::<Result<Vec<_>, RemapError>>()?;
-        let names = std::iter::once("probe").chain(Baseline::ALL.map(Baseline::title));
-        let methods: Vec<MethodScores> = names
+        let methods: Vec<MethodScores> = Self::methods()
             .enumerate()
             .filter_map(|(k, name)| {
                 let scores: Option<Vec<&Score>> = rows.iter().map(|row| row[k].as_ref()).collect();
@@ -201,8 +247,8 @@ impl<'a> Validator<'a> {
             .collect();
         let mean = |m: &MethodScores| m.scores.masked.iter().map(|s| s.mean).sum::<f64>();
         let probe_is_best = methods[1..].iter().all(|m| mean(&methods[0]) < mean(m));
-        let environment = self.scene.environment.as_ref().map(|e| e.map.clone()).unwrap_or_default();
-        let (scene, size, points) = (self.scene.name.clone(), self.renderer.size(), points.len());
+        let (scene, environment) = (self.scene().name.clone(), self.environment());
+        let (size, points) = (self.size(), points.len());
         let metric_points = judged.len();
         let metrics = if judged.is_empty() { &[] } else { METRICS };
         Ok(ValidationReport {
@@ -217,7 +263,7 @@ impl<'a> Validator<'a> {
         })
     }
 
-    /// The source material of an entry, what the probe makes of it, and what each baseline that applies does.
+    /// The source material of an entry, and what [`Validator::methods`] make of it; nothing where a baseline does not apply.
     ///
     /// # Errors
     /// Where a material cannot be made.
@@ -228,6 +274,21 @@ impl<'a> Validator<'a> {
             targets.push(rule.apply(&source, &self.probe.to)?);
         }
         Ok((source, targets))
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The map that lights it; empty where none does.
+    pub fn environment(&self) -> String {
+        self.scene.environment.as_ref().map(|e| e.map.clone()).unwrap_or_default()
+    }
+
+    /// Side of the pictures in pixels.
+    pub fn size(&self) -> usize {
+        self.renderer.size()
     }
 
     /// The radial mask of the scene's spheres.
@@ -301,10 +362,5 @@ fn metric_scores(readings: &[&Reading]) -> MetricScores {
 fn verdicts(judged: &[&[Reading]]) -> Option<Verdicts> {
     let jod = |readings: &&[Reading]| readings.iter().find(|reading| reading.name == "jod")?.whole;
     let jods: Vec<f64> = judged.iter().filter_map(jod).collect();
-    let count = |verdict: Verdict| jods.iter().filter(|jod| Verdict::of(**jod) == verdict).count();
-    (!jods.is_empty()).then(|| Verdicts {
-        indistinguishable: count(Verdict::Indistinguishable),
-        slightly_different: count(Verdict::SlightlyDifferent),
-        noticeably_different: count(Verdict::NoticeablyDifferent),
-    })
+    (!jods.is_empty()).then(|| Verdicts::of(&jods))
 }

@@ -8,6 +8,7 @@ use crate::args::InspectArgs;
 use crate::commands::check_output;
 use crate::commands::fit::fit_text;
 use crate::commands::invert::derived_text;
+use crate::judgement::{verdicts_json, verdicts_text};
 use crate::output::{loss_table, noise_text, print, print_json, renders_text, score, table};
 
 /// Worst points that are listed.
@@ -26,7 +27,7 @@ pub(crate) fn run(args: &InspectArgs) -> anyhow::Result<()> {
         summary["plot"] = json!(args.plot);
         return print_json(&summary);
     }
-    let more = [sureness(&probe), fit_text(&probe), derived_text(&probe)]
+    let more = [sureness(&probe), verdicts_text(&probe), fit_text(&probe), derived_text(&probe)]
         .map(|t| if t.is_empty() { t } else { t + "\n" });
     print(&format!("{}\n{}parameters of the source:\n{}", text(&probe), more.concat(), loss_table(&losses)))
 }
@@ -72,6 +73,7 @@ fn summary(probe: &Probe) -> serde_json::Value {
         "mean_nrmsd_masked": channel_means(probe, |e| e.nrmsd_masked),
         "saturated": probe.entries.iter().filter(|e| !e.saturated.is_empty()).count(),
         "fit": probe.fit, "derived": probe.derived, "flagged": flagged(probe),
+        "verdicts": verdicts_json(probe),
         "worst": worst(probe).iter().map(|e| json!(e)).collect::<Vec<_>>(),
     })
 }

@@ -48,7 +48,7 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
         );
     }
     let started = Instant::now();
-    let (probe, costs, stage) = match named.is_empty() {
+    let (mut probe, costs, stage) = match named.is_empty() {
         true => (search(&plan, args, &stopped)?, Vec::new(), None),
         false => {
             let stage = cross_stage(&plan, &renderers)?;
@@ -71,7 +71,11 @@ pub(crate) fn run(args: &RemapArgs) -> anyhow::Result<()> {
     let losses = losses(&probe)?;
     eprint!("{}", loss_table(&losses));
     let validation = match (&args.report, stage) {
-        (Some(folder), None) => Some(report::write(&probe, folder)?),
+        (Some(folder), None) => {
+            let validation = report::write(&mut probe, folder, &|| stopped.load(Ordering::Relaxed))?;
+            probe.write(&args.output)?;
+            Some(validation)
+        }
         (Some(folder), Some(stage)) => {
             report::write_across(&probe, &stage, options.sampling.most, folder)?;
             None

@@ -61,18 +61,32 @@ pub struct FitnessWeights {
 
 impl Default for FitnessWeights {
     fn default() -> Self {
-        Self {
-            diffuse: 0.25,
-            specular: 0.75,
-            diffuse_point: 0.025,
-            diffuse_environment: 0.975,
-            specular_point: 0.025,
-            specular_environment: 0.975,
-        }
+        Self::of(0.25, 0.025, 0.025)
     }
 }
 
 impl FitnessWeights {
+    /// The weights of the paper's three numbers (section 4): w_S = 1 - w_D, β = 1 - α, δ = 1 - γ.
+    pub fn of(diffuse: f64, diffuse_point: f64, specular_point: f64) -> Self {
+        Self {
+            diffuse,
+            specular: 1.0 - diffuse,
+            diffuse_point,
+            diffuse_environment: 1.0 - diffuse_point,
+            specular_point,
+            specular_environment: 1.0 - specular_point,
+        }
+    }
+
+    /// Equation 3, given its norms.
+    pub fn sum(&self, terms: &FitnessTerms) -> f64 {
+        let diffuse =
+            self.diffuse_point * terms.diffuse_point + self.diffuse_environment * terms.diffuse_environment;
+        let specular = self.specular_point * terms.specular_point
+            + self.specular_environment * terms.specular_environment;
+        self.diffuse * diffuse + self.specular * specular
+    }
+
     fn check(&self) -> Result<(), ImageError> {
         let named = [
             ("diffuse", self.diffuse),
@@ -87,6 +101,19 @@ impl FitnessWeights {
             None => Ok(()),
         }
     }
+}
+
+/// The four norms of equation 3, which [`FitnessWeights::sum`] adds up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FitnessTerms {
+    /// Diffuse images under the point light.
+    pub diffuse_point: f64,
+    /// Diffuse images under the environment.
+    pub diffuse_environment: f64,
+    /// Specular images under the point light.
+    pub specular_point: f64,
+    /// Specular images under the environment.
+    pub specular_environment: f64,
 }
 
 /// The four renderings of one material: diffuse part alone and everything, each under two lights.
@@ -179,22 +206,27 @@ impl Fitness {
         mask: Option<&[f64]>,
     ) -> Result<f64, ImageError> {
         self.weights.check()?;
-        let w = &self.weights;
-        let diffuse = w.diffuse_point * self.norm(&source.diffuse_point, &target.diffuse_point, mask)?
-            + w.diffuse_environment
-                * self.norm(&source.diffuse_environment, &target.diffuse_environment, mask)?;
-        let specular_point = self.norm(
-            &subtract(&source.full_point, &source.diffuse_point)?,
-            &subtract(&target.full_point, &target.diffuse_point)?,
-            mask,
-        )?;
-        let specular_environment = self.norm(
-            &subtract(&source.full_environment, &source.diffuse_environment)?,
-            &subtract(&target.full_environment, &target.diffuse_environment)?,
-            mask,
-        )?;
-        let specular = w.specular_point * specular_point + w.specular_environment * specular_environment;
-        Ok(w.diffuse * diffuse + w.specular * specular)
+        let specular =
+            |full: &[[f64; 3]], diffuse: &[[f64; 3]], other_full: &[[f64; 3]], other_diffuse: &[[f64; 3]]| {
+                self.norm(&subtract(full, diffuse)?, &subtract(other_full, other_diffuse)?, mask)
+            };
+        let terms = FitnessTerms {
+            diffuse_point: self.norm(&source.diffuse_point, &target.diffuse_point, mask)?,
+            diffuse_environment: self.norm(&source.diffuse_environment, &target.diffuse_environment, mask)?,
+            specular_point: specular(
+                &source.full_point,
+                &source.diffuse_point,
+                &target.full_point,
+                &target.diffuse_point,
+            )?,
+            specular_environment: specular(
+                &source.full_environment,
+                &source.diffuse_environment,
+                &target.full_environment,
+                &target.diffuse_environment,
+            )?,
+        };
+        Ok(self.weights.sum(&terms))
     }
 
     /// ‖a - b‖ of two linear RGB images.
@@ -265,6 +297,22 @@ mod tests {
         negative.weights.specular_point = -1.0;
         let error = negative.evaluate(&probe(1.0), &probe(1.0), None).unwrap_err().to_string();
         assert!(error.contains("`specular_point` is -1"), "{error}");
+    }
+
+    #[test]
+    fn three_numbers_make_all_weights() {
+        let paper = FitnessWeights::default();
+        assert_eq!((paper.diffuse, paper.specular), (0.25, 0.75));
+        assert_eq!((paper.diffuse_point, paper.diffuse_environment), (0.025, 0.975));
+        assert_eq!((paper.specular_point, paper.specular_environment), (0.025, 0.975));
+        let terms = FitnessTerms {
+            diffuse_point: 1.0,
+            diffuse_environment: 10.0,
+            specular_point: 100.0,
+            specular_environment: 1000.0,
+        };
+        let expected = 0.5 * (0.25 + 7.5) + 0.5 * (75.0 + 250.0);
+        assert_eq!(FitnessWeights::of(0.5, 0.25, 0.75).sum(&terms), expected);
     }
 
     #[test]

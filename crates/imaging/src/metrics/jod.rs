@@ -14,6 +14,9 @@ use crate::{Image, ImageError, srgb_encode};
 pub const VIEWING: &str = "30-inch 4K monitor of 200 cd/m², contrast 1000, in an office of 250 lux, from twice its height: 75 pixels \
                            per degree; radiance 1 is its white, brighter light is clipped";
 
+/// Version of the authors' model.
+pub const MODEL_VERSION: &str = Cvvdp::MODEL_VERSION;
+
 /// The monitor of [`VIEWING`] among those of the authors.
 const MONITOR: &str = "standard_4k";
 

@@ -58,6 +58,20 @@ impl Components {
         Self { mean, directions }
     }
 
+    /// The strongest of them alone.
+    pub(crate) fn first(mut self, count: usize) -> Self {
+        self.directions.truncate(count);
+        self
+    }
+
+    /// The picture with some loadings of the first components.
+    pub(crate) fn picture(&self, loadings: &[f64]) -> Vec<f32> {
+        let mut picture = self.mean.clone();
+        let parts = self.directions.iter().zip(loadings);
+        parts.for_each(|(direction, value)| add(&mut picture, direction, *value as f32));
+        picture
+    }
+
     /// Number of components.
     pub(crate) fn len(&self) -> usize {
         self.directions.len()

@@ -7,6 +7,7 @@
 
 mod components;
 mod interpolation;
+mod study;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -22,6 +23,7 @@ use crate::gallery::{Key, key};
 
 use components::{Components, Loadings};
 use interpolation::{Interpolation, Metric};
+pub use study::{PictureError, SynthesisExample, SynthesisQuality, SynthesisStudy, study_synthesis};
 
 /// Fitness that the components may leave out of the pictures that they are made of, as root mean square.
 const LEFT_OUT: f64 = 0.01;

@@ -1,4 +1,6 @@
-//! What people do without a probe: rules that copy parameters by their names.
+//! What people do without a probe: rules that copy parameters by their names, and published translations.
+
+mod translation;
 
 use lookmatch_materials::{Material, Model, Role};
 
@@ -13,59 +15,75 @@ pub enum Baseline {
     /// Same width; the target's Fresnel term is replaced by the source's constant reflectance, the rule of material
     /// distillers.
     CopyWithoutFresnel,
+    /// MaterialX's published translation, where there is one between the models.
+    Translation,
 }
 
 impl Baseline {
-    /// Both rules.
-    pub const ALL: [Self; 2] = [Self::Copy, Self::CopyWithoutFresnel];
+    /// All rules.
+    pub const ALL: [Self; 3] = [Self::Copy, Self::CopyWithoutFresnel, Self::Translation];
 
     /// Name in tables.
     pub fn title(self) -> &'static str {
         match self {
             Self::Copy => "copy",
             Self::CopyWithoutFresnel => "copy, no Fresnel",
+            Self::Translation => "MaterialX translation",
         }
     }
 
     /// Applies the rule; `fixed` gives what it does not speak of. `None` where the target has no choice to leave the
-    /// Fresnel term out.
+    /// Fresnel term out, and where no translation was published.
     ///
     /// # Errors
     /// A value that the target cannot hold.
     pub fn apply(self, source: &Material, fixed: &Material) -> Result<Option<Material>, RemapError> {
-        let mut target = fixed.clone();
-        carry_over(&SourceLook::new(source), &mut target, (&[], &[]), Body::Copied)?;
-        let look = source.canonical();
-        if let Some(alpha) = look.alpha {
-            target.set_alpha(alpha)?;
-        }
-        // Both have a complex index, which was carried over: what is left is the scale of the lobe.
-        let shares_index = look.index.is_some() && target.is_conductor();
-        let scale = source.by_role(Role::SpecularReflectance).and_then(|v| v.mean());
         match self {
-            Self::Copy if shares_index => {
-                target.set_role(Role::SpecularReflectance, [scale.unwrap_or(1.0); 3])?;
-            }
-            // The index stays as it is: the scale makes up for it.
-            Self::Copy if target.is_conductor() => {
-                target.set_role(Role::SpecularReflectance, [1.0; 3])?;
-                if let Some((wanted, own)) = look.f0.zip(target.canonical().f0) {
-                    let scale = std::array::from_fn(|c| wanted[c] / own[c].max(1e-9));
-                    target.set_role(Role::SpecularReflectance, scale)?;
-                }
-            }
-            Self::Copy => look.f0.map_or(Ok(()), |f0| target.set_f0(f0))?,
-            Self::CopyWithoutFresnel => {
-                let f0 = look.f0.filter(|_| look.index.is_none());
-                let (true, Some(f0)) = (has_choice(target.model(), "fresnel", "none"), f0) else {
-                    return Ok(None);
-                };
-                target.set("fresnel", "none")?;
-                target.set_role(Role::SpecularReflectance, f0)?;
-            }
+            Self::Copy => copy(source, fixed).map(Some),
+            Self::CopyWithoutFresnel => copy_without_fresnel(source, fixed),
+            Self::Translation => translation::translate(source, fixed),
         }
-        Ok(Some(target))
     }
+}
+
+/// The target with the source's body, layers and width of the lobe.
+fn with_width(source: &Material, fixed: &Material) -> Result<Material, RemapError> {
+    let mut target = fixed.clone();
+    carry_over(&SourceLook::new(source), &mut target, (&[], &[]), Body::Copied)?;
+    if let Some(alpha) = source.canonical().alpha {
+        target.set_alpha(alpha)?;
+    }
+    Ok(target)
+}
+
+fn copy(source: &Material, fixed: &Material) -> Result<Material, RemapError> {
+    let mut target = with_width(source, fixed)?;
+    let look = source.canonical();
+    if !target.is_conductor() {
+        look.f0.map_or(Ok(()), |f0| target.set_f0(f0))?;
+    } else if look.index.is_some() {
+        // Both have a complex index, which was carried over: what is left is the scale of the lobe.
+        let scale = source.by_role(Role::SpecularReflectance).and_then(|v| v.mean());
+        target.set_role(Role::SpecularReflectance, [scale.unwrap_or(1.0); 3])?;
+    } else {
+        // The index stays as it is: the scale makes up for it.
+        target.set_role(Role::SpecularReflectance, [1.0; 3])?;
+        if let Some((wanted, own)) = look.f0.zip(target.canonical().f0) {
+            let scale = std::array::from_fn(|c| wanted[c] / own[c].max(1e-9));
+            target.set_role(Role::SpecularReflectance, scale)?;
+        }
+    }
+    Ok(target)
+}
+
+fn copy_without_fresnel(source: &Material, fixed: &Material) -> Result<Option<Material>, RemapError> {
+    let look = source.canonical();
+    let f0 = look.f0.filter(|_| look.index.is_none());
+    let (true, Some(f0)) = (has_choice(fixed.model(), "fresnel", "none"), f0) else { return Ok(None) };
+    let mut target = with_width(source, fixed)?;
+    target.set("fresnel", "none")?;
+    target.set_role(Role::SpecularReflectance, f0)?;
+    Ok(Some(target))
 }
 
 fn has_choice(model: &Model, name: &str, option: &str) -> bool {
