@@ -11,7 +11,7 @@ use lookmatch_remap::{
 use lookmatch_rendering::Illumination;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::commands::validate::{MAP_POINTS, Stop, prepared, verdicts_with_progress, with_progress};
+use crate::commands::validate::{Stop, prepared, verdicts_with_progress, with_progress};
 use crate::judgement::{metric_rows, validation_text, verdicts_text, viewing_lines};
 use crate::output::{bar, score, table};
 
@@ -19,6 +19,8 @@ use crate::output::{bar, score, table};
 const SIZE: usize = 300;
 /// Source points that all metrics judge, as in `validate`.
 const METRIC_POINTS: usize = 48;
+/// Source points of the map of verdicts: enough to see where it turns, in some seconds; `validate --write` judges more.
+const MAP_POINTS: usize = 140;
 /// The picture of the probe.
 const PLOT: &str = "probe.png";
 /// Matches of other renderers that are pictured: every picture is rendered for it.

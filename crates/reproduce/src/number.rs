@@ -34,6 +34,24 @@ pub(crate) fn measured(finding: &Finding) -> [String; 2] {
     [value, format!("{words} {bar}")]
 }
 
+/// Findings with what is to be said of their cause: where several that are missed one after another share one, the last of them tells it.
+pub(crate) fn with_causes<'a>(findings: &[&'a Finding]) -> Vec<(&'a Finding, Option<String>)> {
+    let is_shared = |a: &&Finding, b: &&Finding| !a.is_reached() && !b.is_reached() && a.cause == b.cause;
+    let told = |group: &[&'a Finding]| {
+        let cause = group[0].cause.as_deref().unwrap_or("the cause is not known");
+        let cause = match group.len() {
+            1 => cause.to_owned(),
+            count => format!("these {count}: {cause}"),
+        };
+        let last = group.len() - 1;
+        let one = |(k, finding): (usize, &&'a Finding)| {
+            (*finding, (k == last && !finding.is_reached()).then(|| cause.clone()))
+        };
+        group.iter().enumerate().map(one).collect::<Vec<_>>()
+    };
+    findings.chunk_by(is_shared).flat_map(told).collect()
+}
+
 /// Ours beside the paper's, and their ratio where there is one: "0.0101 / 0.0107", "(0.94×)".
 pub(crate) fn beside(ours: f64, paper: f64) -> (String, Option<String>) {
     let ratio = ours / paper;
@@ -106,6 +124,22 @@ mod tests {
         assert_eq!(both(0.0107, 0.0), "0.0107 / 0 ");
         let finding = Finding { name: "share".into(), value: 0.559_99, bar: Bar::AtLeast(0.56), cause: None };
         assert_eq!(measured(&finding), ["0.55999", "at least 0.56000"]);
+    }
+
+    #[test]
+    fn a_cause_that_several_share_is_told_once() {
+        let finding = |value, cause: &str| Finding {
+            name: "share".into(),
+            value,
+            bar: Bar::AtLeast(0.5),
+            cause: (!cause.is_empty()).then(|| cause.into()),
+        };
+        let all =
+            [finding(0.1, "a"), finding(0.2, "a"), finding(0.9, "a"), finding(0.3, "a"), finding(0.4, "")];
+        let told: Vec<Option<String>> =
+            with_causes(&all.iter().collect::<Vec<_>>()).into_iter().map(|(_, cause)| cause).collect();
+        let expected = [None, Some("these 2: a"), None, Some("a"), Some("the cause is not known")];
+        assert_eq!(told, expected.map(|cause| cause.map(str::to_owned)));
     }
 
     #[test]

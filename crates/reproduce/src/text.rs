@@ -2,7 +2,7 @@
 
 use comfy_table::{CellAlignment, ContentArrangement, Table as Layout, presets};
 
-use crate::number::{beside, duration, measured, number, tally};
+use crate::number::{beside, duration, measured, number, tally, with_causes};
 use crate::{Cell, Finding, Report, Row, Run, Table};
 
 /// Columns of the terminal.
@@ -57,12 +57,12 @@ fn heading(report: &Report) -> String {
 /// What is missed, with value, bar and cause; what is reached, in a line each.
 fn findings(findings: &[Finding]) -> String {
     let mut layout = layout();
-    for finding in findings {
+    for (finding, cause) in with_causes(&findings.iter().collect::<Vec<_>>()) {
         let [value, bar] = measured(finding);
-        let mut line = format!("{}: {value}, {bar}", finding.name);
-        if !finding.is_reached() {
-            let cause = finding.cause.as_deref().unwrap_or("the cause is not known");
-            line = format!("{}: {value}, not {bar}: {cause}", finding.name);
+        let mut line =
+            format!("{}: {value}, {}{bar}", finding.name, if finding.is_reached() { "" } else { "not " });
+        if let Some(cause) = cause {
+            line += &format!(": {cause}");
         }
         layout.add_row([if finding.is_reached() { "reached" } else { "MISSED" }, &line]);
     }

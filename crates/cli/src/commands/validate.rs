@@ -11,7 +11,7 @@ use crate::report::scores_table;
 use crate::transport::{Preparation, cache};
 
 /// Entries that people would look at for the probe's map of verdicts: 35 ms of a core for each method and entry.
-pub(crate) const MAP_POINTS: usize = 400;
+const MAP_POINTS: usize = 400;
 
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<()> {
     if args.points == Some(0) {

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::number::{duration, measured, tally};
+use crate::number::{duration, measured, tally, with_causes};
 use crate::{Finding, Report};
 
 /// All experiments in a table; what they miss is named right there.
@@ -28,8 +28,9 @@ pub(super) fn overview(reports: &[Report]) -> Markup {
                             td.number { (reached) }
                             td.number.worse[missed > 0] { (missed) }
                         }
-                        @for finding in report.findings.iter().filter(|finding| !finding.is_reached()) {
-                            tr.missed { td colspan="4" { (sentence(finding)) } }
+                        @let missed: Vec<&Finding> = report.findings.iter().filter(|finding| !finding.is_reached()).collect();
+                        @for (finding, cause) in with_causes(&missed) {
+                            tr.missed { td colspan="4" { (sentence(finding, cause)) } }
                         }
                     }
                 }
@@ -43,9 +44,9 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
     html! {
         @if !findings.is_empty() {
             ul.findings {
-                @for finding in findings {
-                    @if finding.is_reached() { li.reached { (sentence(finding)) } }
-                    @else { li.missed { (sentence(finding)) } }
+                @for (finding, cause) in with_causes(&findings.iter().collect::<Vec<_>>()) {
+                    @if finding.is_reached() { li.reached { (sentence(finding, cause)) } }
+                    @else { li.missed { (sentence(finding, cause)) } }
                 }
             }
         }
@@ -53,7 +54,7 @@ pub(super) fn findings(findings: &[Finding]) -> Markup {
 }
 
 /// A finding with its value, its bar and, where it is missed, the cause.
-fn sentence(finding: &Finding) -> Markup {
+fn sentence(finding: &Finding, cause: Option<String>) -> Markup {
     let [value, bar] = measured(finding);
     let (mark, word) = if finding.is_reached() { ("✓", "reached: ") } else { ("✗", "missed: ") };
     html! {
@@ -62,9 +63,7 @@ fn sentence(finding: &Finding) -> Markup {
             span.hidden { (word) } (finding.name) ": " b { (value) } ", "
             @if !finding.is_reached() { "not " }
             (bar)
-            @if !finding.is_reached() {
-                p.cause { (finding.cause.as_deref().unwrap_or("The cause is not known.")) }
-            }
+            @if let Some(cause) = cause { p.cause { (cause) } }
         }
     }
 }

@@ -42,6 +42,8 @@ pub(super) struct Gap {
     probe: Distances,
     /// Of the best targets, for each source and each kind of distance another.
     best: Distances,
+    /// Of the targets that are best by [`Kind::DeltaE`]: what a search with the same metric would take if it looked at these pictures.
+    led: Distances,
 }
 
 /// A picture as it is compared.
@@ -84,22 +86,32 @@ pub(super) fn gap(setting: &Setting, watch: &dyn Watch, probe: &Probe, name: &st
     let targets = targets(setting, probe)?;
     watch.begin(&format!("all targets of {name} in the validation scene"), targets.len());
     // The probe's own targets count as well: a quick run looks at a part of the lattice.
-    let mut best = taken.clone();
+    let (mut best, mut led) = (taken.clone(), taken.clone());
     for batch in targets.chunks(BATCH) {
         anyhow::ensure!(!watch.is_stopped(), "stopped");
         let images = validator.render(&batch.iter().collect::<Vec<_>>());
         let shots: Vec<Shot> = images.into_par_iter().map(Shot::of).collect();
-        best.par_iter_mut().zip(&sources).try_for_each(|(best, source)| -> anyhow::Result<()> {
+        let rows = best.par_iter_mut().zip(&mut led).zip(&sources);
+        rows.try_for_each(|((best, led), source)| -> anyhow::Result<()> {
             for shot in &shots {
                 let now = source.distances(shot, mask)?;
                 best.iter_mut().zip(now).for_each(|(best, now)| *best = best.min(now));
+                if now[Kind::DeltaE as usize] < led[Kind::DeltaE as usize] {
+                    *led = now;
+                }
             }
             Ok(())
         })?;
         watch.advance(batch.len());
     }
     let means = |rows: &[Distances]| std::array::from_fn(|k| mean(rows.iter().map(|row| row[k])));
-    Ok(Gap { points: places.len(), targets: targets.len(), probe: means(&taken), best: means(&best) })
+    Ok(Gap {
+        points: places.len(),
+        targets: targets.len(),
+        probe: means(&taken),
+        best: means(&best),
+        led: means(&led),
+    })
 }
 
 /// The targets of a probe's lattice; in a quick run those at every fourth level of each longer axis.
@@ -123,6 +135,12 @@ impl Gap {
         self.probe[kind as usize] / self.best[kind as usize]
     }
 
+    /// Mean distance of the targets that are best by [`Kind::DeltaE`] over that of the best ones: what looking with that metric costs, even on
+    /// the pictures that judge.
+    pub(super) fn cost_of_metric(&self, kind: Kind) -> f64 {
+        self.led[kind as usize] / self.best[kind as usize]
+    }
+
     /// Mean NRMSD of the whole picture, channel by channel, of the targets that suit each channel best.
     pub(super) fn best_channels(&self) -> [f64; 3] {
         std::array::from_fn(|c| self.best[KINDS.len() + c])
@@ -131,19 +149,25 @@ impl Gap {
     pub(super) fn table(&self, index: &str) -> Table {
         let row = |(kind, name): (Kind, &str)| Row {
             name: name.into(),
-            cells: [self.probe[kind as usize], self.best[kind as usize], self.ratio(kind)]
+            cells: [&self.probe, &self.best, &self.led]
+                .map(|means| means[kind as usize])
+                .into_iter()
+                .chain([self.ratio(kind)])
                 .map(Cell::Number)
-                .into(),
+                .collect(),
             is_main: matches!(kind, Kind::Masked),
         };
         Table {
             title: format!("The probe beside the best that GGX can do, {index}"),
             about: format!(
                 "Mean over {} source points; the best is found among {} targets, for each source and each kind of distance, on the very \
-                 pictures that judge it ({SIZE} pixels a side). The search minimises the last kind, in another scene under another light.",
+                 pictures that judge it ({SIZE} pixels a side). The search minimises the last kind, in another scene under another light; \
+                 beside it, what it would take if it looked at these pictures.",
                 self.points, self.targets
             ),
-            columns: ["", "probe", "best possible", "ratio"].map(str::to_owned).into(),
+            columns: ["", "probe", "best possible", "best by ΔE76", "probe over best"]
+                .map(str::to_owned)
+                .into(),
             rows: KINDS.map(row).into(),
         }
     }
