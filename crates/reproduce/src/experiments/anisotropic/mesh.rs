@@ -25,7 +25,7 @@ pub(super) fn comparisons(
     album: &Album,
     probe: &Probe,
 ) -> anyhow::Result<Vec<Comparison>> {
-    let (size, samples) = if setting.is_quick { (80, 16) } else { (200, 64) };
+    let (size, samples) = if setting.is_quick { (64, 8) } else { (200, 64) };
     // A lobe that is neither mirror-like nor rough.
     let last = probe.source_axes.get(3).map(|axis| axis.nearest(128.0));
     let places = path(case, probe, last);

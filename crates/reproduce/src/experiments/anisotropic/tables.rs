@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lookmatch_plots::{Chart, Series, draw_charts};
+use lookmatch_plots::{Chart, Series, draw_charts, draw_probe};
 use lookmatch_remap::{Probe, Statistics};
 
 use super::judge::{Score, method_names};
@@ -91,6 +91,17 @@ pub(super) fn figure(case: &Case, album: &Album, probe: &Probe) -> anyhow::Resul
     Ok(Figure {
         title: format!("Widths of {}'s lobe over the anisotropy", case.models[1]),
         about: "From the one direction through isotropic to the other.".into(),
+        file,
+    })
+}
+
+/// All target parameters over the last two of the source, which for three of them are both widths.
+pub(super) fn maps(album: &Album, probe: &Probe) -> anyhow::Result<Figure> {
+    let (path, file) = album.figure("maps.png");
+    draw_probe(probe, &path)?;
+    Ok(Figure {
+        title: "The map".into(),
+        about: "Target parameters over two of the source, at some levels of the others.".into(),
         file,
     })
 }
