@@ -258,7 +258,7 @@ mod tests {
         let lattice = lookmatch_search::Lattice { axes: probe.source_axes.clone() };
         for point in lattice.points(&lookmatch_search::Bounds::full(&lattice)) {
             let source = lattice.values(&point);
-            let width = |k: usize| if case.mask { source[k] } else { 0.5 + source[k] / 2.0 };
+            let width = |k: usize| if case.mask { source[k] } else { 1.0 + source[k] / 2.0 };
             let entry = serde_json::json!({"source": source, "target": [0.1, width(1), width(2)], "fitness": 0,
                 "nrmsd": [0, 0, 0], "nrmsd_masked": [0, 0, 0], "evaluations": 0, "saturated": []});
             probe.entries.push(serde_json::from_value(entry).unwrap());
