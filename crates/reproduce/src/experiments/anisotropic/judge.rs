@@ -43,7 +43,7 @@ pub(super) fn method_names() -> impl Iterator<Item = &'static str> {
 impl Judge {
     pub(super) fn new(setting: &Setting, watch: &dyn Watch, probe: &Probe) -> anyhow::Result<Self> {
         // Every pixel of an anisotropic lobe is a thousand directions.
-        let size = if setting.is_quick { 40 } else { 80 };
+        let size = if setting.is_quick { 48 } else { 80 };
         watch.begin("light of the sphere", 0);
         let scene = Scene { environment: Some(EnvironmentLight::balanced(LIGHT)?), ..Scene::reference() };
         let scene = scene.for_model(probe.from.model());
