@@ -29,8 +29,7 @@ pub(super) fn report(
     let there = mean(gap.there.iter().copied());
     let best = mean(gap.best.iter().copied());
     let cause = format!(
-        "measured: the remap's own search on the validation pictures, by Eq. 3 in CIELAB, comes to {:.2}× the best, so that {}; NRMSD counts \
-         linear light, where little but highlights weighs",
+        "measured: the remap's own search on the validation pictures, by Eq. 3 in CIELAB, comes to {:.2}× the best, so that {}",
         there / best,
         if there / best > 1.0 + 0.5 * (ratio - 1.0) {
             "most of the gap is between the two metrics"

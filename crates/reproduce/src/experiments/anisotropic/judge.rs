@@ -11,6 +11,7 @@ use crate::{Setting, Watch};
 
 /// The sphere, prepared.
 pub(super) struct Judge {
+    pub(super) scene: Scene,
     pub(super) renderer: Renderer,
 }
 
@@ -47,7 +48,7 @@ impl Judge {
         let scene = Scene { environment: Some(EnvironmentLight::balanced(LIGHT)?), ..Scene::reference() };
         let scene = scene.for_model(probe.from.model());
         let renderer = Renderer::cached(&scene, Illumination::All, size, &setting.cache, &|_| ())?;
-        Ok(Self { renderer })
+        Ok(Self { scene, renderer })
     }
 
     pub(super) fn size(&self) -> usize {

@@ -5,7 +5,6 @@ use lookmatch_materials::Material;
 use lookmatch_remap::Probe;
 use lookmatch_rendering::{Illumination, Part, PathTracer, Scene};
 
-use super::judge::pair;
 use super::{Case, path};
 use crate::album::{Album, Shown};
 use crate::{Comparison, Setting, Watch};
@@ -25,7 +24,7 @@ pub(super) fn comparisons(
     album: &Album,
     probe: &Probe,
 ) -> anyhow::Result<Vec<Comparison>> {
-    let (size, samples) = if setting.is_quick { (80, 16) } else { (200, 64) };
+    let (size, samples) = if setting.is_quick { (64, 8) } else { (200, 64) };
     // A lobe that is neither mirror-like nor rough.
     let last = probe.source_axes.get(3).map(|axis| axis.nearest(128.0));
     let places = path(case, probe, last);
@@ -38,7 +37,11 @@ pub(super) fn comparisons(
     let names = ["one direction", "isotropic", "the other direction"];
     let mut comparisons = Vec::new();
     for (k, (place, name)) in chosen.into_iter().zip(names).enumerate() {
-        let (mut source, mut target) = pair(probe, &probe.entries[place])?;
+        let entry = &probe.entries[place];
+        let mut source = probe.source_material(&entry.source)?;
+        // As many digits as anybody would type.
+        let typed: Vec<f64> = entry.target.iter().map(|value| (1e4 * value).round() / 1e4).collect();
+        let mut target = probe.target_material(&source, &typed, entry.body)?;
         [&mut source, &mut target].into_iter().try_for_each(|material| material.set("diffuse", BODY))?;
         let shown = |title, material: &Material| -> anyhow::Result<Shown> {
             Ok(Shown {

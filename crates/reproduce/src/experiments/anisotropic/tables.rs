@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lookmatch_plots::{Chart, Series, draw_charts};
+use lookmatch_plots::{Chart, Series, draw_charts, draw_probe};
 use lookmatch_remap::{Probe, Statistics};
 
 use super::judge::{Score, method_names};
@@ -12,18 +12,19 @@ use crate::tables::mean;
 use crate::{Cell, Figure, Row, Table};
 
 /// Places of the probe and of the baselines in a score.
-pub(super) fn methods(scores: &[Score]) -> Range<usize> {
-    0..scores.iter().map(|score| score.methods.len()).min().unwrap_or(0)
+fn methods<'s>(scores: impl Iterator<Item = &'s Score>) -> Range<usize> {
+    0..scores.map(|score| score.methods.len()).min().unwrap_or(0)
 }
 
-/// The mean NRMSD of a method.
-pub(super) fn mean_of(scores: &[Score], method: usize, masked: bool) -> f64 {
-    mean(scores.iter().map(|score| score.methods[method].nrmsd(masked)))
+/// The least mean NRMSD of the baselines.
+pub(super) fn better_baseline(scores: &[&Score], masked: bool) -> f64 {
+    let of = |method: usize| mean(scores.iter().map(|score| score.methods[method].nrmsd(masked)));
+    methods(scores.iter().copied()).skip(1).map(of).fold(f64::INFINITY, f64::min)
 }
 
 /// Minimum, maximum, mean and standard deviation over all source points, beside the baselines.
 pub(super) fn overall(case: &Case, scores: &[Score]) -> Table {
-    let rows = method_names().zip(methods(scores)).map(|(name, k)| {
+    let rows = method_names().zip(methods(scores.iter())).map(|(name, k)| {
         let of = |masked| Statistics::of(scores.iter().map(move |score| score.methods[k].nrmsd(masked)));
         let Statistics { min, max, mean: average, sd } = of(case.mask);
         let jod = mean(scores.iter().map(|score| score.methods[k].jod));
@@ -90,6 +91,17 @@ pub(super) fn figure(case: &Case, album: &Album, probe: &Probe) -> anyhow::Resul
     Ok(Figure {
         title: format!("Widths of {}'s lobe over the anisotropy", case.models[1]),
         about: "From the one direction through isotropic to the other.".into(),
+        file,
+    })
+}
+
+/// All target parameters over the last two of the source, which for three of them are both widths.
+pub(super) fn maps(album: &Album, probe: &Probe) -> anyhow::Result<Figure> {
+    let (path, file) = album.figure("maps.png");
+    draw_probe(probe, &path)?;
+    Ok(Figure {
+        title: "The map".into(),
+        about: "Target parameters over two of the source, at some levels of the others.".into(),
         file,
     })
 }
