@@ -36,7 +36,7 @@ impl Reach {
         guesses + self.levels * self.levels + 4 * self.rounds
     }
 
-    /// The values that suit each region best. `guesses` has values of all regions; `watch` is told of each picture.
+    /// The values that suit each region best. `guesses` has values of all regions.
     ///
     /// # Errors
     /// Those of `errors`, a stop from outside.
@@ -57,7 +57,6 @@ impl Reach {
             let inside = |p: &[f64; 2]| std::array::from_fn(|k| p[k].clamp(low[k], high[k]));
             let places: Vec<[f64; 2]> = places.iter().map(inside).collect();
             let found = errors(&places.iter().map(|place| values(*place)).collect::<Vec<_>>())?;
-            watch.advance(1);
             let better = best.iter_mut().zip(places).zip(found).map(|((best, place), error)| {
                 let is_better = error < best.error;
                 if is_better {

@@ -4,9 +4,9 @@
 //! with independent noise, the mean of `d₁ d₂` is `x²`: noise adds nothing to it. Pictures that are compared share their seeds, so that
 //! most of their noise is the same and cancels in the first place.
 
-use lookmatch_imaging::{Image, Mask};
+use lookmatch_imaging::Image;
 use lookmatch_materials::Material;
-use lookmatch_rendering::{Illumination, Part, PathTracer, Scene, Wears};
+use lookmatch_rendering::{Illumination, Part, PathTracer, Scene, Spot, Wears};
 
 use crate::Watch;
 use crate::tables::mean;
@@ -17,13 +17,14 @@ const BATCH: usize = 4096;
 /// A scene, prepared twice with seeds of its own.
 pub(crate) struct Twins {
     tracers: [PathTracer; 2],
-    size: usize,
+    /// What is rendered, row by row from the top left.
+    pixels: Vec<u32>,
 }
 
 /// What some pixels show, twice with independent noise.
 pub(crate) struct Pair([Vec<[f32; 3]>; 2]);
 
-/// Which pixels of a picture belong together.
+/// Which pixels belong together.
 pub(crate) struct Regions {
     /// For each pixel, the number of its region, if it is in one.
     pub(crate) of: Vec<Option<usize>>,
@@ -35,16 +36,28 @@ impl Twins {
     /// For pictures of `size` × `size` pixels with twice `samples` paths for each.
     pub(crate) fn prepare(scene: &Scene, size: usize, samples: u32, seed: u64) -> anyhow::Result<Self> {
         let tracer = |seed| PathTracer::prepare(scene, Illumination::All, size, samples, seed);
-        Ok(Self { tracers: [tracer(seed)?, tracer(!seed)?], size })
+        let pixels = (0..(size * size) as u32).collect();
+        Ok(Self { tracers: [tracer(seed)?, tracer(!seed)?], pixels })
     }
 
-    pub(crate) fn size(&self) -> usize {
-        self.size
+    /// Only the pixels whose middle shows a subject.
+    pub(crate) fn of_subjects(mut self) -> Self {
+        let spots = self.tracers[0].spots();
+        self.pixels.retain(|pixel| spots[*pixel as usize].is_some());
+        self
     }
 
-    /// Either of both, for what does not depend on noise.
-    pub(crate) fn tracer(&self) -> &PathTracer {
-        &self.tracers[0]
+    /// Its pixels by what their middles show of the subjects.
+    pub(crate) fn regions(&self, count: usize, of: impl Fn(Spot) -> Option<usize>) -> Regions {
+        let spots = self.tracers[0].spots();
+        let region = |pixel: &u32| spots[*pixel as usize].and_then(&of);
+        Regions { of: self.pixels.iter().map(region).collect(), count }
+    }
+
+    /// Weights of its pixels that fall towards silhouettes.
+    pub(crate) fn weights(&self) -> Vec<f32> {
+        let mask = self.tracers[0].mask();
+        self.pixels.iter().map(|pixel| mask.weights()[*pixel as usize]).collect()
     }
 
     /// Pictures of subjects that wear some materials.
@@ -54,10 +67,9 @@ impl Twins {
         wears: Wears,
         watch: &dyn Watch,
     ) -> anyhow::Result<Pair> {
-        let pixels: Vec<u32> = (0..(self.size * self.size) as u32).collect();
         let one = |tracer: &PathTracer| -> anyhow::Result<Vec<[f32; 3]>> {
-            let mut all = Vec::with_capacity(pixels.len());
-            for batch in pixels.chunks(BATCH) {
+            let mut all = Vec::with_capacity(self.pixels.len());
+            for batch in self.pixels.chunks(BATCH) {
                 anyhow::ensure!(!watch.is_stopped(), "stopped");
                 all.extend(tracer.radiance_dressed(materials, wears, Part::Full, batch));
             }
@@ -69,7 +81,7 @@ impl Twins {
 }
 
 impl Pair {
-    /// The mean of both, as a square picture.
+    /// The mean of both, as a square picture of all pixels.
     pub(crate) fn image(&self, size: usize) -> Image {
         let at = |half: usize, pixel: usize, c: usize| self.0[half][pixel][c];
         let value = |pixel: usize, c: usize| (at(0, pixel, c) + at(1, pixel, c)) / 2.0;
@@ -86,12 +98,12 @@ impl Pair {
 
     /// NRMSD of each region beside another picture, mean of the channels, without what noise adds; differences are multiplied by the
     /// weights of their pixels. The range is that of this whole picture.
-    pub(crate) fn nrmsd(&self, other: &Self, regions: &Regions, weights: Option<&Mask>) -> Vec<f64> {
+    pub(crate) fn nrmsd(&self, other: &Self, regions: &Regions, weights: Option<&[f32]>) -> Vec<f64> {
         let ranges = self.ranges();
         let (mut sums, mut counts) = (vec![[0.0; 3]; regions.count], vec![0usize; regions.count]);
         for (k, region) in regions.of.iter().enumerate() {
             let Some(region) = *region else { continue };
-            let weight = weights.map_or(1.0, |mask| f64::from(mask.weights()[k]));
+            let weight = weights.map_or(1.0, |weights| f64::from(weights[k]));
             let off = |half: usize, c: usize| weight * f64::from(self.0[half][k][c] - other.0[half][k][c]);
             (0..3).for_each(|c| sums[region][c] += off(0, c) * off(1, c));
             counts[region] += 1;
@@ -110,13 +122,6 @@ impl Pair {
                 values.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| (low.min(v), high.max(v)));
             ends.1 - ends.0
         })
-    }
-}
-
-impl Regions {
-    /// All of a picture.
-    pub(crate) fn whole(size: usize) -> Self {
-        Self { of: vec![Some(0); size * size], count: 1 }
     }
 }
 
