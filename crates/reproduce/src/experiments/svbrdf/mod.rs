@@ -64,12 +64,7 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
     let probe = found(setting, watch, &probe_name("free"), &plan)?.probe;
     let map = Codes::shipped()?;
     let base = Material::parse(SOURCE)?;
-    let sources = map.levels.iter().map(|level| {
-        let mut source = base.clone();
-        source.set_number("roughness", Codes::roughness(*level))?;
-        Ok(source)
-    });
-    let sources: Vec<Material> = sources.collect::<anyhow::Result<_>>()?;
+    let sources = sources(&map, &base)?;
     let converted = map.convert(&probe, &base, &setting.folder.join("maps").join(NAME))?;
     let mut methods =
         vec![through_maps(&map, &converted, Method::probe("probe, converted maps", &probe, &sources)?)?];
@@ -130,6 +125,16 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
         )],
         ..Report::default()
     })
+}
+
+/// The source with the roughness of each level.
+fn sources(map: &Codes, base: &Material) -> anyhow::Result<Vec<Material>> {
+    let source = |level: &u8| {
+        let mut source = base.clone();
+        source.set_number("roughness", Codes::roughness(*level))?;
+        Ok(source)
+    };
+    map.levels.iter().map(source).collect()
 }
 
 /// A method's targets with the values of the converted maps.
@@ -227,7 +232,7 @@ fn best(
     sources: &[Material],
     probe: &Method,
 ) -> anyhow::Result<Vec<Values>> {
-    let (size, samples, levels, rounds) = if setting.is_quick { (40, 4, 3, 4) } else { (80, 32, 5, 10) };
+    let (size, samples, levels, rounds) = if setting.is_quick { (56, 16, 4, 6) } else { (80, 32, 5, 10) };
     let reach = Reach { limits: LIMITS, levels, rounds };
     let guesses = [vec![PROBE; BANDS]];
     watch.begin("the best targets of all bands", 1 + reach.pictures(guesses.len()));
@@ -284,17 +289,18 @@ fn bands_table(map: &Codes, bands: &Bands, judged: &[Judged], least: &[f64]) -> 
 
 /// The source's map beside those that it became.
 fn maps_figure(album: &Album, map: &Codes, converted: &Converted) -> anyhow::Result<Figure> {
-    let largest = converted.index.iter().copied().fold(1.0, f32::max);
+    let indices = || converted.index.iter().copied();
+    let (least, largest) = (indices().fold(f32::MAX, f32::min), indices().fold(0.0, f32::max));
     let grey =
         |numbers: Vec<f32>| Image::from_fn(map.width, map.height, |x, y| [numbers[y * map.width + x]; 3]);
-    let index = converted.index.iter().map(|index| (index - 1.0) / (largest - 1.0)).collect();
+    let index = indices().map(|index| (index - least) / (largest - least).max(f32::EPSILON)).collect();
     let images = [grey(map.numbers()), grey(converted.roughness.clone()), grey(index)];
     let (path, file) = album.figure("maps.png");
     lookmatch_imaging::write(&path, &Image::beside(&images.each_ref()), &[])?;
     Ok(Figure {
         title: "The map, and what it becomes".into(),
         about: format!(
-            "Roughness of the source, roughness of the target, index of the target (black for 1, white for {largest:.2})."
+            "Roughness of the source, roughness of the target, index of the target (black for {least:.2}, white for {largest:.2})."
         ),
         file,
     })
@@ -355,5 +361,21 @@ mod tests {
         let same = bands.adjusted(&method, &vec![PROBE; BANDS]).unwrap();
         assert!((same[0].number("ior").unwrap() - 1.6).abs() < 1e-12);
         assert_eq!(same[0].number("roughness").unwrap(), 0.2);
+    }
+
+    #[test]
+    fn converted_maps_say_what_the_probe_says() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../textures/src/ward-ggx.json");
+        let probe = lookmatch_remap::Probe::read(std::path::Path::new(file)).unwrap();
+        let (map, base) = (Codes::shipped().unwrap(), Material::parse(SOURCE).unwrap());
+        let folder = tempfile::tempdir().unwrap();
+        let converted = map.convert(&probe, &base, folder.path()).unwrap();
+        let sources = sources(&map, &base).unwrap();
+        let method = Method::probe("", &probe, &sources).unwrap();
+        let expected = method.values().unwrap();
+        let found = through_maps(&map, &converted, method).unwrap().values().unwrap();
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-4), "{found:?} {expected:?}");
+        }
     }
 }
