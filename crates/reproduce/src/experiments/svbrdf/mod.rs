@@ -358,7 +358,7 @@ mod tests {
             title: "",
             targets: vec![Material::parse("ggx:ior=1.6,roughness=0.2").unwrap(); map.levels.len()],
         };
-        let same = bands.adjusted(&method, &vec![PROBE; BANDS]).unwrap();
+        let same = bands.adjusted(&method, &[PROBE; BANDS]).unwrap();
         assert!((same[0].number("ior").unwrap() - 1.6).abs() < 1e-12);
         assert_eq!(same[0].number("roughness").unwrap(), 0.2);
     }
