@@ -40,10 +40,11 @@ impl Twins {
         Ok(Self { tracers: [tracer(seed)?, tracer(!seed)?], pixels })
     }
 
-    /// Only the pixels whose middle shows a subject.
-    pub(crate) fn of_subjects(mut self) -> Self {
+    /// Only one of so many of the pixels whose middle shows a subject.
+    pub(crate) fn some_of_subjects(mut self, one_of: usize) -> Self {
         let spots = self.tracers[0].spots();
         self.pixels.retain(|pixel| spots[*pixel as usize].is_some());
+        self.pixels = self.pixels.into_iter().step_by(one_of).collect();
         self
     }
 
