@@ -13,7 +13,7 @@ use crate::nearest::{Reach, Values};
 use crate::probes::found;
 use crate::tables::{bar, mean};
 use crate::twins::{Pair, Regions, Twins};
-use crate::{Bar, Cell, Report, Row, Setting, Table, Watch};
+use crate::{Bar, Cell, Finding, Report, Row, Setting, Table, Watch};
 
 const NAME: &str = "colour-checker";
 /// Linear sRGB of the patches, row by row from the top left (see `assets/README.md`).
@@ -207,7 +207,7 @@ struct Gap {
 }
 
 impl Gap {
-    fn finding(&self) -> crate::Finding {
+    fn finding(&self) -> Finding {
         let name = "mean NRMSD of the patches over that of the best target of each, free index";
         let [probe, best] = self.elsewhere;
         let cause = format!(

@@ -66,7 +66,7 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
     let probe = found(setting, watch, &probe_name("free"), &plan)?.probe;
     let (titles, cases) = cases(&probe)?;
     let effort = match setting.is_quick {
-        true => Effort { exact: 64, traced: (48, 4), shown: (64, 4) },
+        true => Effort { exact: 48, traced: (48, 4), shown: (96, 4) },
         false => Effort { exact: 160, traced: (96, 16), shown: (160, 16) },
     };
     let (scenes, maps): (&[&str], &[&str]) =

@@ -6,7 +6,7 @@ mod maps;
 use lookmatch_imaging::{Image, Mask};
 use lookmatch_materials::Material;
 use lookmatch_plots::{Chart, Series, draw_charts};
-use lookmatch_remap::Strategy;
+use lookmatch_remap::{Probe, Strategy};
 use lookmatch_rendering::{EnvironmentLight, Scene, Spot};
 
 use self::maps::{Codes, Converted};
@@ -17,7 +17,7 @@ use crate::nearest::{Reach, Values};
 use crate::probes::found;
 use crate::tables::{bar, mean};
 use crate::twins::{Pair, Regions, Twins};
-use crate::{Bar, Cell, Figure, Report, Row, Setting, Table, Watch};
+use crate::{Bar, Cell, Figure, Finding, Report, Row, Setting, Table, Watch};
 
 const NAME: &str = "svbrdf";
 /// The source without its map: dark, as onyx is.
@@ -95,22 +95,6 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
     let whole = Mask::uniform(size, size);
     let title = "A sphere of onyx (Figure 10)".to_owned();
     let comparison = album.compare("sphere", title, &shown("source", &ball.source), &others, &whole)?;
-    let ratio = average(&judged[0].bands) / average(&least);
-    let gap = bar(
-        "mean masked NRMSD of the bands of roughness over that of the best targets".into(),
-        ratio,
-        Bar::AtMost(1.10),
-        &format!(
-            "the probe's targets lie on a lattice whose roughness has steps of {:.3}, and between its points they are interpolated; with the \
-             probe's index and the best roughness of each band, the ratio is {:.2}",
-            probe
-                .target_axes
-                .iter()
-                .find(|axis| axis.name == "roughness")
-                .map_or(0.0, |axis| axis.value(1) - axis.value(0)),
-            average(&widths.bands) / average(&least)
-        ),
-    );
     Ok(Report {
         title: "A map of roughness".into(),
         about: format!(
@@ -124,7 +108,7 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
             map.height,
             map.levels.len(),
         ),
-        findings: vec![gap],
+        findings: vec![gap_bar(&probe, &judged[0], &widths, &least)],
         tables: vec![methods_table(&judged, &best, &least), bands_table(&map, &bands, &judged, &least)],
         comparisons: vec![comparison],
         figures: vec![
@@ -138,6 +122,20 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
         )],
         ..Report::default()
     })
+}
+
+/// The bar of the gap, with what the widths alone do for it.
+fn gap_bar(probe: &Probe, judged: &Judged, widths: &Judged, least: &[f64]) -> Finding {
+    let over_best = |judged: &Judged| average(&judged.bands) / average(least);
+    let axis = probe.target_axes.iter().find(|axis| axis.name == "roughness");
+    let cause = format!(
+        "the probe's targets lie on a lattice whose roughness has steps of {:.3}, and between its points they are interpolated; with the \
+         probe's index and the best roughness of each band, the ratio is {:.2}",
+        axis.map_or(0.0, |axis| axis.value(1) - axis.value(0)),
+        over_best(widths)
+    );
+    let name = "mean masked NRMSD of the bands of roughness over that of the best targets";
+    bar(name.into(), over_best(judged), Bar::AtMost(1.10), &cause)
 }
 
 /// The source with the roughness of each level.
@@ -398,7 +396,7 @@ mod tests {
     #[test]
     fn converted_maps_say_what_the_probe_says() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../textures/src/ward-ggx.json");
-        let probe = lookmatch_remap::Probe::read(std::path::Path::new(file)).unwrap();
+        let probe = Probe::read(std::path::Path::new(file)).unwrap();
         let (map, base) = (Codes::shipped().unwrap(), Material::parse(SOURCE).unwrap());
         let folder = tempfile::tempdir().unwrap();
         let converted = map.convert(&probe, &base, folder.path()).unwrap();
