@@ -6,12 +6,15 @@
 mod album;
 mod experiment;
 mod experiments;
+mod methods;
+mod nearest;
 mod number;
 mod page;
 mod probes;
 mod report;
 mod tables;
 mod text;
+mod twins;
 mod write;
 
 pub use experiment::{Experiment, Setting, Watch};

@@ -8,6 +8,7 @@
 //! throws onto a diffuse surface, and that of further lamps of an environment with more than a few.
 
 mod glint;
+mod look;
 mod sampler;
 mod sky;
 mod vertex;
