@@ -54,7 +54,8 @@ fn is_of(probe: &Probe, plan: &Plan) -> bool {
     probe.program == program
         && (&probe.from, &probe.to) == (&plan.from, &plan.to)
         && (&probe.source_axes, &probe.target_axes) == (&plan.source_axes, &plan.target_axes)
-        && (probe.strategy, &probe.search, probe.preset) == (plan.strategy, &plan.search, plan.preset)
+        && (probe.strategy, &probe.search, probe.refined) == (plan.strategy, &plan.search, plan.refine)
+        && probe.preset == plan.preset
         && (probe.seed, probe.size, probe.metric.mask) == (plan.seed, plan.size, plan.mask)
         && probe.metric.weights == plan.metric.weights
 }

@@ -246,7 +246,7 @@ fn better_than_baselines(all: &[Judged], titles: &[&str]) -> Finding {
     let judged: Vec<&Judged> = all.iter().collect();
     let of = |(k, (name, _)): (usize, &(&str, &str))| format!("{name} {:.2}", ratio(&judged, &[k]));
     let cause = format!(
-        "not known; by material, the ratio is: {}",
+        "by material, the ratio is: {}",
         SOURCES.iter().enumerate().map(of).collect::<Vec<_>>().join(", ")
     );
     let name = "mean masked NRMSD over that of the better baseline, all scenes and maps";
