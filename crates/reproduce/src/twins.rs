@@ -133,8 +133,12 @@ mod tests {
     /// A ramp from 0 to 1, with noise that differs from half to half.
     fn pair(gain: f32, noise: f32) -> Pair {
         let half = |k: usize| {
-            let hash =
-                |p: usize| ((p * 2 + k) as u32).wrapping_mul(2_654_435_761).wrapping_mul(747_796_405) >> 16;
+            // Mixed well: halves whose noise is related would not do.
+            let hash = |p: usize| {
+                let x = (p * 2 + k) as u32;
+                let mixed = (0x7feb_352d_u32.wrapping_mul(x) >> 7 ^ x).wrapping_mul(0x846c_a68b);
+                (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d) >> 16
+            };
             let value = |p: usize| gain * p as f32 / 9999.0 + noise * (hash(p) as f32 / 32767.5 - 1.0);
             (0..10_000).map(|p| [value(p); 3]).collect()
         };

@@ -6,7 +6,7 @@ mod maps;
 use lookmatch_imaging::{Image, Mask};
 use lookmatch_materials::Material;
 use lookmatch_plots::{Chart, Series, draw_charts};
-use lookmatch_remap::{Probe, Strategy};
+use lookmatch_remap::Strategy;
 use lookmatch_rendering::{EnvironmentLight, Scene, Spot};
 
 use self::maps::{Codes, Converted};
@@ -108,7 +108,7 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
             map.height,
             map.levels.len(),
         ),
-        findings: vec![gap_bar(&probe, &judged[0], &widths, &least)],
+        findings: vec![gap_bar(&methods[0], &ratios, [&judged[0].bands, &widths.bands, &least])?],
         tables: vec![methods_table(&judged, &best, &least), bands_table(&map, &bands, &judged, &least)],
         comparisons: vec![comparison],
         figures: vec![
@@ -125,17 +125,17 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
 }
 
 /// The bar of the gap, with what the widths alone do for it.
-fn gap_bar(probe: &Probe, judged: &Judged, widths: &Judged, least: &[f64]) -> Finding {
-    let over_best = |judged: &Judged| average(&judged.bands) / average(least);
-    let axis = probe.target_axes.iter().find(|axis| axis.name == "roughness");
+fn gap_bar(probe: &Method, ratios: &[Values], errors: [&[f64]; 3]) -> anyhow::Result<Finding> {
+    let [own, widths, least] = errors.map(average);
+    let smoothest = probe.values()?[0][1];
     let cause = format!(
-        "the probe's targets lie on a lattice whose roughness has steps of {:.3}, and between its points they are interpolated; with the \
-         probe's index and the best roughness of each band, the ratio is {:.2}",
-        axis.map_or(0.0, |axis| axis.value(1) - axis.value(0)),
-        over_best(widths)
+        "it is the roughness: with the probe's index and the best roughness of each band, the ratio is {:.2}; in the smoothest band, the probe \
+         has a roughness of {smoothest:.3} and the best is {:.3}",
+        widths / least,
+        smoothest * ratios[0][1],
     );
     let name = "mean masked NRMSD of the bands of roughness over that of the best targets";
-    bar(name.into(), over_best(judged), Bar::AtMost(1.10), &cause)
+    Ok(bar(name.into(), own / least, Bar::AtMost(1.10), &cause))
 }
 
 /// The source with the roughness of each level.
@@ -396,7 +396,7 @@ mod tests {
     #[test]
     fn converted_maps_say_what_the_probe_says() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../textures/src/ward-ggx.json");
-        let probe = Probe::read(std::path::Path::new(file)).unwrap();
+        let probe = lookmatch_remap::Probe::read(std::path::Path::new(file)).unwrap();
         let (map, base) = (Codes::shipped().unwrap(), Material::parse(SOURCE).unwrap());
         let folder = tempfile::tempdir().unwrap();
         let converted = map.convert(&probe, &base, folder.path()).unwrap();
