@@ -17,7 +17,7 @@ use crate::nearest::{Reach, Values};
 use crate::probes::found;
 use crate::tables::{bar, mean};
 use crate::twins::{Pair, Regions, Twins};
-use crate::{Bar, Cell, Figure, Finding, Report, Row, Setting, Table, Watch};
+use crate::{Bar, Cell, Figure, Finding, Picture, Report, Row, Setting, Table, Watch};
 
 const NAME: &str = "svbrdf";
 /// The source without its map: dark, as onyx is.
@@ -108,7 +108,12 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
             map.height,
             map.levels.len(),
         ),
-        findings: vec![gap_bar(&methods[0], &ratios, [&judged[0].bands, &widths.bands, &least])?],
+        findings: vec![gap_bar(
+            &methods[0],
+            &ratios,
+            [&judged[0].bands, &widths.bands, &least],
+            &comparison.others,
+        )?],
         tables: vec![methods_table(&judged, &best, &least), bands_table(&map, &bands, &judged, &least)],
         comparisons: vec![comparison],
         figures: vec![
@@ -125,14 +130,23 @@ pub(super) fn run(setting: &Setting, watch: &dyn Watch) -> anyhow::Result<Report
 }
 
 /// The bar of the gap, with what the widths alone do for it.
-fn gap_bar(probe: &Method, ratios: &[Values], errors: [&[f64]; 3]) -> anyhow::Result<Finding> {
+fn gap_bar(
+    probe: &Method,
+    ratios: &[Values],
+    errors: [&[f64]; 3],
+    pictures: &[Picture],
+) -> anyhow::Result<Finding> {
     let [own, widths, least] = errors.map(average);
     let smoothest = probe.values()?[0][1];
+    let jod = |picture: Option<&Picture>| picture.and_then(|picture| picture.jod).unwrap_or(f64::NAN);
     let cause = format!(
         "it is the roughness: with the probe's index and the best roughness of each band, the ratio is {:.2}; in the smoothest band, the probe \
-         has a roughness of {smoothest:.3} and the best is {:.3}",
+         has a roughness of {smoothest:.3} and the best is {:.3}; the search minimises distances in CIELAB instead of NRMSD, and to the eye the \
+         targets with the least NRMSD are at {:.2} JOD, the probe's at {:.2}",
         widths / least,
         smoothest * ratios[0][1],
+        jod(pictures.last()),
+        jod(pictures.first()),
     );
     let name = "mean masked NRMSD of the bands of roughness over that of the best targets";
     Ok(bar(name.into(), own / least, Bar::AtMost(1.10), &cause))

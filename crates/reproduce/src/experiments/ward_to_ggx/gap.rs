@@ -36,7 +36,7 @@ const KINDS: [(Kind, &str); 3] = [
 
 /// Means over some source points.
 pub(super) struct Gap {
-    points: usize,
+    pub(super) points: usize,
     targets: usize,
     /// Of the probe's targets.
     probe: Distances,

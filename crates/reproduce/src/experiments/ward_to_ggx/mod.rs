@@ -126,7 +126,8 @@ fn out_of_reach(gap: &Gap) -> String {
     format!(
         "the index ends at {HIGHEST}, a reflectance of 0.089 at normal incidence, and brighter sources are out of reach (see the table of both \
          halves): even the targets of this range that suit these pictures best, for each source and channel, have a mean of {r:.4}, {g:.4} and \
-         {b:.4}; over which source points the paper averaged is not published"
+         {b:.4} at {} of the source points; over which source points the paper averaged is not published",
+        gap.points
     )
 }
 
