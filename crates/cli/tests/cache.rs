@@ -282,10 +282,17 @@ fn damaged_pictures_are_told_and_rendered_again() {
     let Some(place) = Place::new() else { return };
     let (first, _) = place.done(place.remap("a.json", "1"));
     let needed = count(&first, "renders");
-    // One has a wrong byte, one lies under another's key, one is gone.
-    place.sql("UPDATE pictures SET exr = substr(exr, 1, 400) || x'5a5a' || substr(exr, 403) WHERE id = 3");
-    place.sql("UPDATE pictures SET exr = (SELECT exr FROM pictures WHERE id = 6) WHERE id = 5");
-    place.sql("DELETE FROM pictures WHERE id = 7");
+    // One has a wrong byte, one lies under another's key, one is gone. Ids follow the order in which pictures arrived, which is another
+    // every time, and some pictures are equal; descriptions lie in one order.
+    let id = |k: usize| format!("(SELECT id FROM renders ORDER BY description LIMIT 1 OFFSET {k})");
+    let damaged = "substr(exr, 1, 400) || x'5a5a' || substr(exr, 403)";
+    place.sql(&format!("UPDATE pictures SET exr = {damaged} WHERE id = {}", id(3)));
+    place.sql(&format!(
+        "UPDATE pictures SET exr = (SELECT exr FROM pictures WHERE id = {}) WHERE id = {}",
+        id(6),
+        id(5)
+    ));
+    place.sql(&format!("DELETE FROM pictures WHERE id = {}", id(7)));
     let (second, told) = place.done(place.remap("b.json", "1"));
     let lines: Vec<&str> = told.lines().filter(|line| line.contains("damaged picture")).collect();
     assert_eq!(lines.len(), 3, "{told}");
@@ -299,8 +306,8 @@ fn damaged_pictures_are_told_and_rendered_again() {
     assert_eq!((count(&third, "renders"), told.contains("warning")), (0, false), "{told}");
 
     // Found by looking for it.
-    let changed = "UPDATE renders SET description = replace(description, '\"model\":\"plastic\"', '\"model\":\"plastiC\"') WHERE id = 4";
-    place.sql(changed);
+    let changed = "replace(description, '\"model\":\"plastic\"', '\"model\":\"plastiC\"')";
+    place.sql(&format!("UPDATE renders SET description = {changed} WHERE id = {}", id(20)));
     let output = place.cache(&["verify", "--json"]);
     assert_eq!(output.status.code(), Some(1));
     let verified: Json = serde_json::from_slice(&output.stdout).unwrap();
