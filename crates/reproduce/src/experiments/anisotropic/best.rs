@@ -44,7 +44,7 @@ pub(super) fn gap(
     setting: &Setting,
     watch: &dyn Watch,
 ) -> anyhow::Result<Gap> {
-    let places = validation_points(probe, Some(if setting.is_quick { 2 } else { 12 }));
+    let places = validation_points(probe, Some(if setting.is_quick { 2 } else { 8 }));
     watch.begin("best targets for these pictures", places.len());
     let there = Plan { scene: judge.scene.clone(), strategy: Strategy::Unconstrained, ..plan.clone() };
     let stage = Stage::cached(&there, &setting.cache, &|_| ())?;

@@ -70,10 +70,10 @@ static LAFORTUNE_TO_WARD: Case = Case {
     title: "Lafortune to Ward, anisotropic",
     models: ["lafortune", "ward"],
     source: &[
-        ("specular", [&[0.1, 0.3], &[0.3]]),
+        ("specular", [&[0.3], &[0.3]]),
         ("cx", DIRECTIONS),
         ("cy", DIRECTIONS),
-        ("exponent", [&[32.0, 128.0, 256.0, 512.0], &[128.0]]),
+        ("exponent", [&[32.0, 128.0, 512.0], &[128.0]]),
     ],
     // Lobes that fade are matched by a hundredth of their scale.
     scales: (0.25, 1.12),
@@ -98,7 +98,7 @@ static WARD_TO_GGX: Case = Case {
     name: "ward-to-ggx-aniso",
     title: "Ward to GGX, anisotropic",
     models: ["ward", "ggx"],
-    source: &[("specular", [&[0.1, 0.35], &[0.2]]), ("roughness_u", WIDTHS), ("roughness_v", WIDTHS)],
+    source: &[("specular", [&[0.2], &[0.2]]), ("roughness_u", WIDTHS), ("roughness_v", WIDTHS)],
     scales: (1.0, 1.09),
     mask: true,
     pairs: &[],
